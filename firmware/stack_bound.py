@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 FRAME = 32
-"""What the processor itself pushes for an interrupt [bytes]."""
+"""Bytes that the processor itself pushes for an interrupt."""
 INTERRUPTS = ("systick_interrupt", "bus_interrupt", "bus_received_interrupt", "pc_interrupt", "zigbee_interrupt")
 LIBRARY = {"__aeabi_uldivmod": 48, "__aeabi_ldivmod": 48, "memcpy": 16, "memset": 16, "memmove": 16}
 """Bounds of what libgcc brings [bytes]."""

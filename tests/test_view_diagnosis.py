@@ -233,9 +233,9 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
     assert headline(two).startswith("Backlash at flm and ground friction explain part of")
     guess = replace(finding("ground_friction"), where=(), confidence=0.4, alternatives=())
     assert headline(replace(two, findings=(finding(), guess))) == (
-        "Backlash at flm explains part of what the model missed; the rest is not identified with certainty yet.")
+        "Backlash at flm explains part of the model's error; the rest is not identified with certainty yet.")
     assert headline(replace(two, findings=(guess,))) == (
-        "Nothing that the workbench knows is likely to be what the model missed; nearest comes ground friction.")
+        "No known effect is a likely explanation of the model's error; the closest candidate is ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
     assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
     assert "no effect that the workbench knows explains how" in headline(replace(nothing, verdict="unexplained"))
@@ -248,7 +248,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
              "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
-             "Tried in its place", "dead band at flm reduces chi squared", "Before and after, on unseen stretches",
+             "Alternatives that were tried", "dead band at flm reduces chi squared", "Before and after, on unseen stretches",
              "Residuals", "a &lt;take&gt;", "What else was tried", "its response does not match the residuals",
              "What to record next", "next_experiment.csv", "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]

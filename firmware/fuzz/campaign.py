@@ -1,10 +1,10 @@
-"""The fuzzers: do they find what is planted, how much do they reach, and do they find nothing else?
+"""The fuzzers: do they find planted faults, how much do they cover, and do they find nothing else?
 
     python firmware/fuzz/campaign.py plant|clean|cover [--seconds N]
 
 `plant` puts ten faults into copies of the core, one at a time; each has to be found within the time. `clean` runs the targets on
-the core as it is, the time shared among them, and keeps the few inputs that reach all that was reached. `cover` says which share
-of the core's branches these reach (gcov). Times are processor times, so that a busy machine changes nothing. Kept inputs:
+the unchanged core, the time shared among them, and keeps the few inputs that reach the same coverage. `cover` reports the share
+of the core's branches that these reach (gcov). Times are processor times, so that a busy machine changes nothing. Kept inputs:
 firmware/fuzz/corpus.zip; those that a person wrote: seeds.py.
 """
 
@@ -31,7 +31,7 @@ SHARES = {"robot": 4, "table": 1, "answer": 1}
 """Parts of the time by target."""
 MAX_LENGTH = {"robot": 500, "table": 800, "answer": 300}
 COUNTED = ("-use_counters=0", "-print_final_stats=0")
-"""For what is kept: a branch that is taken counts, not how often."""
+"""For kept inputs: a branch that is taken counts, not how often."""
 
 PLANTED = (
     ("robot", "upload.c", "if (offset > u->got || offset + n > u->size) return UPLOAD_OFFSET;",
@@ -48,7 +48,7 @@ PLANTED = (
     ("answer", "frame.c", "if (r->state > LENGTH && r->length > FRAME_PAYLOAD) r->state = FIRST;", ""),
     ("answer", "remote.c", "if (count == 1) return byte == 0x55;", ""),
 )
-"""target, file, what stands there, what is put in its place."""
+"""target, file, original text, replacement."""
 
 
 def compile_target(target: str, core: Path, out: Path) -> None:
@@ -86,7 +86,7 @@ def kept_inputs(target: str, folder: Path) -> list[Path]:
 
 
 def keep(found: dict[str, list[bytes]]) -> None:
-    """One archive of all targets' inputs, the same bytes for the same inputs."""
+    """One archive of every target's inputs, the same bytes for the same inputs."""
     part = CORPUS.with_suffix(".part")
     with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         for target, contents in sorted(found.items()):
@@ -124,7 +124,7 @@ def plant(seconds: int) -> int:
 
 
 def clean(seconds: int) -> int:
-    """The core as it is; what is new in the corpus is kept. Returns how many targets crashed."""
+    """Runs on the unchanged core; new inputs of the corpus are kept. Returns how many targets crashed."""
     crashed, kept = 0, {}
     for target, share in SHARES.items():
         with tempfile.TemporaryDirectory() as temporary:

@@ -188,7 +188,7 @@ def bridged() -> list[bytes]:
 
 
 def faults() -> list[bytes]:
-    """What goes wrong, in each state."""
+    """Faults, in each state."""
     one_servo = [(MUTE, 1), (TWIN, 1), (OVERLOAD, 1), (HEAT, 66), (HEAT, 80), (HELD, 1), (POWERED, 0), (MOVED, 150)]
     scripts = [[state, fault(4, what, value), run(900), order(STOP), run(1000), run(3000)]
                for what, value in one_servo for state in (FRESH, PLAYING, NEUTRAL)]

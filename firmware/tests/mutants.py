@@ -32,12 +32,12 @@ CORE = sorted((path.stem.removeprefix("test_") for path in (FIRMWARE.parent / "t
               key=lambda name: (name != "core_edges", name))
 FORMATS = ["table_file", "link"]
 OF_FORMATS = ("table.c", "frame.c", "crc.c", "upload.c")
-"""What the longer tests of the two formats, against Python's reader, reach as well."""
+"""Parts that the longer tests of the two formats, against Python's reader, reach as well."""
 EQUIVALENT = {
     ("motion.c", "return true;", "return false;", "turn_over"):
         "the pose that begins a cycle goes out at the second look of the same wake; nothing comes between but bytes of the links",
 }
-"""(file, what was there, what instead, function): why no test can tell."""
+"""(file, original, replacement, function): why no test can tell."""
 CHANGES = (
     (r"(?<![<>=!-])<(?![<=])", "<="), (r"<=", "<"), (r"(?<![->=])>(?![>=])", ">="), (r">=", ">"), (r"==", "!="), (r"!=", "=="),
     (r"&&", "||"), (r"\|\|", "&&"), (r"(?<=[\w)] )\+(?= [\w(])", "-"), (r"(?<=[\w)] )-(?= [\w(])", "+"),

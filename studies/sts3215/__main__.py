@@ -113,7 +113,7 @@ def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) 
         law = out / "law" / "diagnosis" / "model.yaml"
     known = load_model(law)
     for case in (c for c in cases[1:] if not args.only or c.name in args.only):
-        for previous, since in ((known, SINCE), (None, ALONE)):
+        for previous, since in ((known, SINCE), (None, ALONE))[:1 if args.since_only else 2]:
             folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
             outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress, args.memory))
     (out / "outcomes.json").write_text(json.dumps([o.to_json() for o in outcomes], indent=1))
@@ -128,6 +128,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study resumes")
     parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="these sessions alone, beyond the law's")
+    parser.add_argument("--since-only", action="store_true", help="no session from itself alone but the one that gives the law")
     parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
     args, others = parser.parse_known_args()
     return run_study("sts3215", __doc__, partial(study, args), others)

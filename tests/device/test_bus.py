@@ -74,7 +74,7 @@ def test_an_absent_servo_is_one_line_and_quick():
 def test_an_adapter_that_echoes_is_refused_or_stripped(family):
     r = robot(family, joints=["flm"])
     r.port.echo = True
-    with pytest.raises(BusError, match="the adapter hears what it sends itself"):
+    with pytest.raises(BusError, match="the adapter echoes its own transmissions"):
         r.bus()
     bus = r.bus(strip_echo=True)
     assert bus.read(FLM, "id") == {"id": FLM}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import JOINT, Linear, candidate, region
-from workbench.identify.evidence.fit import fitting
+from workbench.identify.evidence.fit import fitting, regressed
 from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.posterior import posterior_of
@@ -41,7 +41,7 @@ def found(log_ratio, sd, options=OPTIONS):
     rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=truth, does=does)
     fit = lockstep(rig, {0: fitting(here, options, start(here.numbers), 0.1, 2 * options.iterations)})[0]
     fits = lockstep(rig, {0: names_of_tie(here, options, fit)})[0]
-    return here, fit, fits
+    return here, fit, [lockstep(rig, {0: regressed(here, options, g)})[0] for g in fits]
 
 
 def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_names():
@@ -70,6 +70,6 @@ def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
     said = gravity_over_torque(here, since, posterior_of([fit, *fits], since), fits)
     assert said.ratio.value == pytest.approx(1.3, rel=0.02)
     assert said.ratio.low < 1.3 < said.ratio.high
-    assert said.confidence > 0.8
+    assert said.confidence > 0.6
     assert best.log_posterior > fit.log_posterior
     assert "--model" not in said.said()

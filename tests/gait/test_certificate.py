@@ -21,6 +21,8 @@ from workbench.gait.request import Request
 from workbench.gait.second_engine import AS_IT_IS, Condition, conditions, margins
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
+from workbench.gait.trim import read_gait, trim
+from workbench.gait.turning import RecordedTurn
 from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import EffectSpec, puppy_model
 from workbench.view.figures.gait import draw_ranges
@@ -211,3 +213,23 @@ def test_a_binary_table_without_a_certificate_has_its_limits_checked(made, tmp_p
     (tmp_path / "motion.table").write_bytes(encode_table(table_file(whole, machine.model)))
     with pytest.raises(InputError, match="beyond the joint's limit"):
         check_table_of("flash", str(tmp_path / "motion.table"), machine.model, force=False)
+
+
+def test_a_trimmed_gait_is_certified_for_the_robot_that_was_recorded(made, tmp_path):
+    folder, machine, table, _ = made
+    gait = read_gait(folder / "gait.csv", machine.model)
+    assert gait.shape == table.shape
+    quick = replace(OPTIONS, draws=0, watched=0, variants=("2 ms",))
+    recorded = RecordedTurn(math.radians(12), math.radians(1), 1.0, 8)
+    done = trim(machine, gait, recorded, load_ensemble(), quick, lambda what, done: None)
+    assert done.turn < 0
+    assert abs(done.expected) < math.radians(2)
+    nominal = done.certified.certificate.nominal  # it does not turn by itself, so that it goes the other way
+    assert abs(nominal.heading) < 3  # relative to the request, which includes the opposite turn
+    assert nominal.turning < -1
+    assert done.request.bias == pytest.approx(math.radians(12), abs=math.radians(4))
+    assert "trimmed for a robot that turns by" in done.certified.certificate.request
+    write_gait(tmp_path, done.table, done.certified)
+    again = read_gait(tmp_path / "gait.csv", machine.model)
+    assert again.request == done.request
+    assert again.shape.turn == pytest.approx(gait.shape.turn + done.turn)

@@ -187,3 +187,35 @@ def test_a_file_that_is_cut_is_refused_in_one_line_or_read_up_to_there(tmp_path:
         except InputError as e:
             said.append(str(e))
     assert not any("\n" in text for text in said)
+
+
+def test_a_capture_that_is_no_small_robot_in_a_room_is_doubted(tmp_path: Path) -> None:
+    from workbench.recording import read_recording
+
+    time = np.arange(40) / 50
+    place, still = np.column_stack([0.2 * time, 0 * time, 0.1 + 0 * time]), np.tile([1.0, 0, 0, 0], (40, 1))
+
+    def read(time: np.ndarray, place: np.ndarray, turn: np.ndarray) -> tuple[str, ...]:
+        path = tmp_path / "poses.csv"
+        names = ["time", *(f"leg.{n}" for n in ("x", "y", "z", "qw", "qx", "qy", "qz"))]
+        path.write_text("\n".join([",".join(names), *(",".join(map(str, row)) for row in np.column_stack([time, place, turn]))]))
+        return read_recording(path).problems
+
+    assert read(time, place, still) == ()
+    assert "quaternions written x, y, z, w" in read(time, place, np.roll(still, -1, axis=1))[0]
+    assert "millimetres" in read(time, 1000 * place * 10, still)[0]
+    assert "frame numbers" in read(50 * time, place, still)[0]
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("arm.xml", "<mujoco/>", "MuJoCo model"), ("arm.usd", "PXR-USDC\0\0", "OpenUSD"), ("leg.stl", "solid leg\n", "mesh"),
+    ("arm.json", '{"pan": {"id": 1, "homing_offset": 3, "range_min": 0, "range_max": 9}}', "calibration file of LeRobot"),
+    ("log.csv", "time,goal.a,position.a\n2025-03-04T12:00:00.02,1,1\n", "seconds since the first row"),
+    ("log.csv", "time,input_pos,pos_estimate\n0,1,1\n0.1,1,1\n", "rename input_pos to goal"),
+    ("log.csv", "time,target_joint_pos_hip,joint_pos_hip\n0,1,1\n0.1,1,1\n", "rename target_joint_pos_hip to goal.hip"),
+])
+def test_what_a_file_is_and_what_to_do_with_it(tmp_path: Path, name: str, content: str, said: str) -> None:
+    path = tmp_path / name
+    path.write_text(content)
+    with pytest.raises(ValueError, match=said):
+        inspect_file(path)

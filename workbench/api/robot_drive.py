@@ -17,6 +17,7 @@ from workbench.gait.drive.loop import FELL, Driven, Progress, Watch, drive
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.robot_walk import ControllerWalk, PoseSource, RobotWalkOptions
 from workbench.robot import RobotModel
+from workbench.robot.mounting import JointServo, Mounting
 from workbench.simulation.virtual_robot import VirtualRobot
 
 ARRIVED = ("end of the path",)
@@ -63,7 +64,9 @@ def drive_on_robot(port: Any, model: RobotModel, family: GaitFamily, path: WayPa
     log: Path | None = folder / "driven_joints.csv"
     try:
         assert log is not None
-        write_telemetry(log, walk.rounds(), sorted(model.joints), family_of(model))
+        joints = sorted(model.joints)
+        servos = [JointServo(family_of(model), model.mountings.get(joint, Mounting())) for joint in joints]
+        write_telemetry(log, walk.rounds(), joints, servos)
     except InputError as e:
         warnings.append(str(e))
         log = None

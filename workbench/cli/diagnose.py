@@ -24,9 +24,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "diagnose",
         help="find the physics that a session's model left out",
-        description="Locates where recordings and model differ, tries every known effect where it could act, fits what is "
-        "likely, keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, "
-        "the session's predictions and report.html. A run that was stopped continues when it is called again.",
+        description="Locates where recordings and model differ, tries every known effect where it could act, fits the likely "
+        "ones, keeps those that lower the error on held-out data, and writes findings.json, model.yaml, nominal.yaml, "
+        "predictions and report.html. An interrupted run continues when it is called again.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     add_yes(parser)
@@ -35,13 +35,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--memory", metavar="DIR", help="directory for cached rollouts, shared by diagnoses of the same takes "
                         "(default: next to --out, deleted on success)")
     parser.add_argument("--thorough", action="store_true",
-                        help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
+                        help="search to the end, however long it takes (default: stop at a limit of work, and report it)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
                         help="exclude this effect (a name from section 7 of docs/formats.md) from the search, because you know "
                         "it is absent; repeatable")
     parser.add_argument("--model", metavar="FILE", dest="previous",
-                        help="model.yaml of an earlier diagnosis of this robot: its servos and effects are nominal, as well as "
-                        "they were known then, and findings are what is new")
+                        help="model.yaml of an earlier diagnosis of this robot, taken as nominal with its uncertainties: "
+                        "findings are the changes since then")
     add_engine(parser, "compiled rollouts, judged by Drake")
     parser.set_defaults(run=run)
 
@@ -87,14 +87,14 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
 
 
 def unknown_line(unknown: UnknownTorque) -> str:
-    """One line of the terminal: a torque that no effect describes, how surely, and what it takes off errors."""
+    """One line for the terminal: a torque that no effect describes, its probability, and the reduction of the error."""
     error = unknown.validation
     return f"{unknown.evidence} (confidence {unknown.confidence:.2f}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"
 
 
 def finding_line(finding: Finding) -> str:
-    """One line of the terminal: what was found, how surely, and what it takes off errors on unseen stretches."""
+    """One line for the terminal: the finding, its probability, and the reduction of the error on held-out stretches."""
     from workbench.view.report.words import this_or
 
     tie, error = finding.tie, finding.validation

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +84,9 @@ def run(args: argparse.Namespace) -> int:
     path = WayPath(args.points)
     _check_port(args, model)
     certified = _certified(args, model)
-    options = DriveOptions(law=args.law, blind=args.blind, **certified.limits if certified else {})
+    options = DriveOptions(law=args.law, blind=args.blind)
+    if certified:
+        options = replace(options, most=certified.most, most_change=certified.most_change)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fitted(args, family, progress)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Checks all servos, ramps from where the robot is to neutral, plays the motion, ramps back and releases. "
         "Writes a joint log with the times really sent, and registers.yaml. Ctrl-C, heat, low voltage or a silent servo end it "
         "with a ramp to neutral; docs/robot-host.md says what else can happen.")
-    parser.add_argument("motion", metavar="MOTION", nargs="?")
+    parser.add_argument("motion", metavar="MOTION", nargs="?", help="pose table, FILE.mtn#page, or a bag with a JointTrajectory")
     add_bus(parser)
     add_model(parser)
     add_cycles(parser, 3)
@@ -34,6 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="share of the torque limit that the servos get, from 10 (default: 100)")
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
     parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
+    parser.add_argument("--bag", action="store_true", help="also write the joint log as a bag of ROS 2 (MCAP), NAME_bag")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
@@ -85,11 +88,25 @@ def run(args: argparse.Namespace) -> int:
         save_registers(registers, args.out / "registers.yaml")
         played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
                          options, progress=progress)
+        offset = time.time() - bus.now()
+    if args.bag:
+        _write_bag(log, played, offset)
     for departure in registers.departures(model):
         print(f"workbench play: warning: {departure}", file=sys.stderr)
     if bus.retries:
         print(f"workbench play: warning: {bus.retries.total()} answers had to be requested again", file=sys.stderr)
     return _tell(log, played)
+
+
+def _write_bag(log: Path, played: Played, offset: float) -> None:
+    """The joint log once more, as a bag. offset: of the time of day, less the bus's clock [s]."""
+    from workbench.recording.formats.read import read_recording
+    from workbench.recording.formats.rosbag_write import write_rosbag
+
+    if played.log_problem or math.isnan(played.log_start):
+        print("workbench play: warning: no bag, as there is no whole joint log", file=sys.stderr)
+        return
+    print(f"wrote {write_rosbag(read_recording(log), log.with_name(log.stem + '_bag'), played.log_start + offset)}")
 
 
 def _tell(log: Path, played: Played) -> int:

@@ -23,6 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     parser.add_argument("--port", type=int, default=1510, metavar="N", help="Motive's command port (default: 1510)")
     parser.add_argument("--no-motive", action="store_true", help="do not have Motive record the take, too, on its own disk")
+    parser.add_argument("--bag", action="store_true", help="also write the take as a bag of ROS 2 (MCAP), NAME_bag")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the take from a NAME.natnet that was cut short")
     add_out(parser, default="runs/record")
     parser.set_defaults(run=run)
@@ -51,7 +52,22 @@ def run(args: argparse.Namespace) -> int:
                       file=sys.stderr)
     for problem in capture.problems:
         print(f"workbench record: warning: {problem}", file=sys.stderr)
+    if args.bag:
+        _write_bag(capture.take)
     counts = capture.counts
     print(f"wrote {capture.take}: {counts.received} frames at {capture.rate:g} Hz, {counts.lost} lost, {counts.late} late, "
           f"{counts.doubled} doubled, {counts.broken} broken")
     return 0
+
+
+def _write_bag(take: Path) -> None:
+    """The take once more, as a bag; its time zero is the first frame's mid-exposure by this computer's clock."""
+    import datetime
+    import json
+
+    from workbench.recording.formats.read import read_recording
+    from workbench.recording.formats.rosbag_write import write_rosbag
+
+    report = json.loads(take.with_suffix(".capture.json").read_text(encoding="utf-8"))
+    began = datetime.datetime.fromisoformat(report["first_frame"]["utc"]).timestamp()
+    print(f"wrote {write_rosbag(read_recording(take), take.with_name(take.stem + '_bag'), began)}")

@@ -16,7 +16,7 @@ HEAD = 5
 
 
 class FrameType(IntEnum):
-    """What a frame is; from 0x80 on the controller's."""
+    """Type of a frame; from 0x80 on the controller's."""
 
     ASK = 0x01
     PLAY = 0x02
@@ -33,7 +33,7 @@ class FrameType(IntEnum):
 
 
 class ControllerState(IntEnum):
-    """What the controller is at (firmware/core/robot.h)."""
+    """State of the controller (firmware/core/robot.h)."""
 
     STILL = 0
     LIMP = 1
@@ -78,8 +78,8 @@ class Frame:
 
 @dataclass(frozen=True)
 class StateMessage:
-    """What the controller is at since `time` [s of its own clock], why, which servo it blames (bus ID or None), which reset it
-    woke from, what was wrong with the last table, number of the last table taken, battery [V]."""
+    """State of the controller since `time` [s of its own clock], the reason, the servo responsible (bus ID or None), the cause of
+    the last reset, fault of the last table, number of the last accepted table, battery [V]."""
 
     time: float
     state: ControllerState
@@ -178,7 +178,7 @@ class FrameReader:
 
 
 def message(got: Frame) -> Message | None:
-    """What a frame of the controller says; None for types that mean nothing here, or a payload that does not fit."""
+    """Content of a frame of the controller; None for types that are unknown here, or a payload that does not fit."""
     try:
         if got.type == FrameType.STATE:
             return _state(got.payload)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ from workbench.recording.recording import Measurement
 from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm, nominal_terms
 from workbench.types import Array
+
+KEPT_BUILDS = 64
+"""Changed descriptions that are kept: more than a fit looks at side by side."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ def physics_of(model: RobotModel) -> Physics:
     friction: dict[str, float] = {}
     stiffness: float | None = None
     terms: list[ServoTerm] = []
-    sdf: SdfRobot | None = None
+    changes: list[tuple[Effect, EffectSpec]] = []
     retimed = any(model.servo(j).goal_delay > 0 for j in model.joints)
     for effect, spec, values in resolved(model):
         columns = _columns(model, spec)
@@ -95,11 +100,32 @@ def physics_of(model: RobotModel) -> Physics:
             friction |= dict.fromkeys(spec.where, slip)
         retimed |= type(effect).commands is not Effect.commands
         if type(effect).description is not Effect.description:
-            sdf = sdf or SdfRobot(model.path)
-            effect.description(sdf, spec, model)
+            changes.append((effect, spec))
+    sdf = _changed(model, changes) if changes else None
     return Physics(sdf, law, ground, friction, stiffness, gravity, tether, zero,
                    sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends,
                    tuple(terms), retimed)
+
+
+_builds: OrderedDict[Any, SdfRobot] = OrderedDict()
+
+
+def _changed(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
+    """The model's SDF with these effects on its description; the same object for the same ones, as most robots of a search differ
+    in their servos alone. Another package's effect may look at all of the model, so that nothing is shared with it."""
+    own = all(type(effect).__module__.startswith(f"{__package__}.") for effect, _ in changes)
+    said = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
+    key = (model.path, model.path.stat().st_mtime_ns, said)
+    if own and (known := _builds.get(key)) is not None:
+        return known
+    sdf = SdfRobot(model.path)
+    for effect, spec in changes:
+        effect.description(sdf, spec, model)
+    if own:
+        _builds[key] = sdf
+        while len(_builds) > KEPT_BUILDS:
+            _builds.popitem(last=False)
+    return sdf
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:

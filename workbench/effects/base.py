@@ -109,6 +109,8 @@ class Effect:
     """The effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
     """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
+    rarity: ClassVar[float] = 0.0
+    """By how much less likely than others it is before any data [nats]."""
     needs_steady_load: ClassVar[bool] = False
     """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True

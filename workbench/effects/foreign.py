@@ -48,11 +48,11 @@ def answering_for(effect: Effect, at: str) -> Effect:
     """The same effect; what its own hooks raise becomes an InputError that names `at`, the effect and the hook."""
     for hook in HOOKS:
         if getattr(type(effect), hook) is not getattr(Effect, hook):
-            object.__setattr__(effect, hook, partial(_called, effect, hook, at))
+            object.__setattr__(effect, hook, partial(_call_hook, effect, hook, at))
     return effect
 
 
-def _called(effect: Effect, hook: str, at: str, *args: Any, **named: Any) -> Any:
+def _call_hook(effect: Effect, hook: str, at: str, *args: Any, **named: Any) -> Any:
     try:
         return getattr(type(effect), hook)(effect, *args, **named)
     except (InputError, MemoryError):

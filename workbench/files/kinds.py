@@ -22,6 +22,8 @@ _TABLE = "a table with time, goal.J and position.J [deg] of each joint J"
 _UNPACK = "unpack it and name the file inside"
 _VIDEO = Kind("a video or picture", "record the servos' positions, or rigid bodies by motion capture")
 _MAT = Kind("a MATLAB file (MAT)", f"write {_TABLE} with writetable(array2table(...), 'log.csv')")
+_DESCRIBED = "name the robot's SDF or URDF, which says where its meshes are"
+_USD = Kind("a scene of OpenUSD", "name the URDF or SDF that it was made of; Isaac Sim exports URDF")
 _BEGINNINGS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"\x89MCAP0\r\n", Kind("a bag of ROS 2 (MCAP)", "name its joint topics' table, made by PlotJuggler or `mcap cat`")),
     (0, b"#ROSBAG V", Kind("a bag of ROS 1 (rosbag)", "make a table of its joint topics: rostopic echo -b BAG -p TOPIC > "
@@ -50,6 +52,9 @@ _BEGINNINGS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"LOGG", Kind("a CAN log (BLF)", f"decode it and write {_TABLE}")),
     (0, b"HIERARCHY", Kind("a BVH skeleton", "export the rigid bodies (6 degrees of freedom), not a skeleton's joint angles")),
     (0, b"Kaydara FBX Binary", Kind("an FBX scene", "export the rigid bodies as CSV")),
+    (0, b"PXR-USDC", _USD), (0, b"#usda", _USD), (0, b"ISO-10303-21", Kind("a CAD model (STEP)", _DESCRIBED)),
+    (0, b"solid ", Kind("a mesh (STL)", _DESCRIBED)), (0, b"ply\n", Kind("a mesh (PLY)", _DESCRIBED)),
+    (0, b"ply\r\n", Kind("a mesh (PLY)", _DESCRIBED)),
     (0, b"glTF", Kind("a 3D scene (glb)", "name the robot's SDF or URDF, which names its meshes")),
     (4, b"ftyp", _VIDEO), (0, b"RIFF", _VIDEO), (0, b"\x1aE\xdf\xa3", _VIDEO), (0, b"\xff\xd8\xff", _VIDEO), (0, b"GIF8", _VIDEO),
     (0, b"%PDF", Kind("a PDF document", "name the recording itself")),
@@ -62,6 +67,9 @@ _SUFFIXES = {
     ".qtm": Kind("a capture of Qualisys (.qtm)", "export its 6D data in QTM: File, Export, TSV, with 6D and header"),
     ".x2d": Kind("a capture of Vicon (.x2d)", "reconstruct it and export trajectories or C3D in Nexus or Tracker"),
     ".system": Kind("a file of Vicon's system", "export segments from Nexus or Tracker as CSV"),
+    ".stl": Kind("a mesh (STL)", _DESCRIBED), ".obj": Kind("a mesh (OBJ)", _DESCRIBED), ".usd": _USD, ".usda": _USD,
+    ".usdc": _USD, ".usdz": _USD, ".f3d": Kind("a CAD model (Fusion)", _DESCRIBED),
+    ".step": Kind("a CAD model (STEP)", _DESCRIBED),
     ".bin": Kind("a binary log", f"write {_TABLE}"), ".mat": _MAT,
     ".pkl": Kind("a Python pickle", f"it can run code and is not read; write {_TABLE} with pandas' to_csv")}
 

@@ -20,7 +20,7 @@ from workbench.robot import RobotModel
 
 NAME = "certificate.json"
 MARK = "made by workbench optimize; its certificate is certificate.json beside it"
-"""What stands in the first line of a motion that has a certificate."""
+"""First line of a motion that has a certificate."""
 CLAIM = "All numbers are the model's: a speed here is a claim about the model until a robot has walked it."
 PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went 37."
 
@@ -33,13 +33,13 @@ RECORDS: dict[str, type[Any]] = {"nominal": Nominal, "ways": Ways, "cycle": Stea
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found out about a gait. Angles in degrees.
+    """Results of the examination of a gait. Angles in degrees.
 
     kept: whether every limit is kept. request: in words; asked: the same as `Request.from_plain` reads it. tables: sha256 of the
     tables, by name (gait). margins: of limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the
-    quantiles 0, 5, 50, 95, 100 % over the ensemble (null where there are fewer than 20); falls, how many robots were drawn, what
-    happened to which, and what is left of their heading once they are straightened. floor: by which steps and contact models move
-    speed and heading. other_engine: the same table elsewhere; empty where there was none. ways: the way in and out. cycle: how
+    quantiles 0, 5, 50, 95, 100 % over the ensemble (null where there are fewer than 20); falls, number of robots drawn, their
+    incidents, and their residual heading after trimming. floor: change of speed and heading with step and contact model.
+    other_engine: the same table in another simulator; empty where there was none. ways: start and stop. cycle: how
     steady the gait is from cycle to cycle, and after how many cycles it walks as before where it was entered otherwise or
     disturbed. provenance: versions, seeds, time.
     """
@@ -60,7 +60,7 @@ class Certificate:
     asked: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """What the file holds, in plain types, with the sha256 of all the rest."""
+        """Content of the file, in plain types, with the sha256 of all the rest."""
         records = {k: to_plain(getattr(self, k)) for k in RECORDS}
         content = plain({"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"}, **records,
                          "margins": [vars(m) for m in self.margins]})
@@ -101,7 +101,7 @@ class Certificate:
 
 
 def _straightened(found: Mapping[str, Any] | None) -> list[str]:
-    """What is left of headings after recordings, in a line; nothing where nobody looked."""
+    """Residual heading after the recordings, in a line; empty where it was not examined."""
     if not found or found["after one metre deg/m RMS"] is None:
         return []
     one, three = found["after one metre deg/m RMS"], found["after 3 metres deg/m RMS"]
@@ -143,8 +143,8 @@ def has_mark(path: str | Path) -> bool:
 
 
 def check_certificate(path: str | Path, motion: Motion, model: RobotModel) -> Certificate:
-    """The certificate beside a motion file that `optimize` made; InputError where it is absent, another's, broken, or says that a
-    limit is broken."""
+    """The certificate in the folder of a motion file made by `optimize`; InputError where it is absent, another's, damaged, or
+    reports a broken limit."""
     certificate = read_certificate(Path(path).parent / NAME)
     at = Path(path).parent / NAME
     if table_sha256(motion.as_table()) not in certificate.tables.values():
@@ -168,7 +168,7 @@ def _digest(content: Mapping[str, Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Plain types, for JSON; what is not known, or without bound, is null."""
+    """Plain types, for JSON; unknown or unbounded values are null."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

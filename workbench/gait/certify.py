@@ -39,7 +39,7 @@ from workbench.types import Progress
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
 
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
-"""What it is, in words, and what is called with what."""
+"""A simulation, in words, and the function that runs it."""
 
 TOGETHER = 4
 """Draws that go to a process at once."""
@@ -76,11 +76,11 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     results = _all(work, options.n_jobs, progress)
     run: NominalRun = next(results)
     nominal = run.measure
-    floor = _floor(request, dict(zip(variants, _taken(results, len(variants)))))
+    floor = _floor(request, dict(zip(variants, _take(results, len(variants)))))
     pairs = {c.name: next(results) for c in conditioned}
-    checks = _taken(results, len(robots[:options.checked]))
+    checks = _take(results, len(robots[:options.checked]))
     cycle: LimitCycle | None = next(results) if options.watched else None
-    robots_drawn = [d for group in _taken(results, len(groups)) for d in group]
+    robots_drawn = [d for group in _take(results, len(groups)) for d in group]
     walks = [w for group in results for w in group]
     told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if straightener is not None:
@@ -118,7 +118,7 @@ def _straightener(machine: GaitMachine, request: Request, table: GaitTable, opti
     return Straightener(machine.model, request, table.shape, speed, gain, request.limits.spread, options.step)
 
 
-def _taken(results: Iterator[Any], count: int) -> list[Any]:
+def _take(results: Iterator[Any], count: int) -> list[Any]:
     """The next `count` of them."""
     return [next(results) for _ in range(count)]
 

@@ -1,4 +1,4 @@
-"""A gait cycle by cycle: what each one does, and how much they differ."""
+"""A gait cycle by cycle: the motion in each, and how much they differ."""
 
 from __future__ import annotations
 

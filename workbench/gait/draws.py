@@ -47,7 +47,7 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
     def line(m: GaitMeasure) -> Margin:
         j = int(np.argmax(m.torque_use))
         joint = machine.model.joints[j]
-        return _margin("torque-speed line", 100 * m.torque_use[j], 100 * limits.torque, "% of what it has", joint)
+        return _margin("torque-speed line", 100 * m.torque_use[j], 100 * limits.torque, "% of the torque available", joint)
 
     def slip(m: GaitMeasure) -> Margin:
         return slip_margin(machine, request, m, limits.slip_on_draws)
@@ -60,7 +60,7 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
         judges.append(clearance)
     out = [_ninth([judge(m) for m in standing]) for judge in judges]
     touched = sum(m.touched for m in standing)
-    allowed_count = len(standing) - _needed(len(standing))
+    allowed_count = len(standing) - _required_count(len(standing))
     use = touched / max(allowed_count, 1) if touched <= allowed_count else 1.0 + touched / len(standing)
     out.append(Margin("other contact" + OVER_DRAWS, f"of {len(standing)} robots", float(touched), float(allowed_count),
                       "robots whose links touch", use))
@@ -90,14 +90,14 @@ def bound(events: int, count: int, confidence: float = 0.95) -> float:
     return 1.0 if count <= events else float(beta.ppf(confidence, events + 1, count - events))
 
 
-def _needed(count: int) -> int:
+def _required_count(count: int) -> int:
     """How many of `count` robots have to keep a limit."""
     return math.ceil(SHARE * count - 1e-9)
 
 
 def _ninth(margins: list[Margin]) -> Margin:
     """The worst margin among the best nine tenths."""
-    needed = _needed(len(margins))
+    needed = _required_count(len(margins))
     m = sorted(margins, key=lambda m: m.use)[needed - 1]
     where = f"{needed} of {len(margins)} robots"
     return replace(m, name=m.name + OVER_DRAWS, where=where if m.where == "robot" else f"{m.where}, {where}")
@@ -109,7 +109,7 @@ def _margin(name: str, value: float, limit: float, unit: str, where: str = "robo
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one robot of the ensemble did. robot: what it is, in words. measure, feet: of its run, by the compiled station, or
+    """One robot of the ensemble. robot: description. measure, feet: of its run, by the compiled station, or
     by Drake where that gave up; incident: what happened, where something did."""
 
     robot: str
@@ -140,8 +140,8 @@ def described(model: RobotModel) -> str:
 
 
 def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
-    """What a certificate says of draws: quantiles where there are FEWEST or more, else the extremes and the median alone; counts
-    with the bound that they leave; and what happened to which robot."""
+    """Summary of draws for a certificate: quantiles where there are FEWEST or more, else the extremes and the median alone;
+    counts with their confidence bound; and the incident of each robot that had one."""
     if not robots:
         return {"count": 0}
     measures = [d.measure for d in robots]

@@ -11,7 +11,7 @@ ENTRY_POINT_GROUP = "workbench.engines"
 
 
 def other_engine() -> tuple[str, OtherEngine] | None:
-    """The first engine that can be loaded, with its name; None where none is installed, or what it needs is not."""
+    """The first engine that can be loaded, with its name; None where none is installed, or its requirements are missing."""
     for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda e: e.name):
         try:
             engine: OtherEngine = entry.load()

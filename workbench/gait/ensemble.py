@@ -50,7 +50,7 @@ class Ensemble:
 
     def draws(self, model: RobotModel, count: int, seed: int, folder: Path) -> list[RobotModel]:
         """`count` robots, the same for the same seed. Robots whose links' masses differ are written into `folder` as SDF files of
-        their own; what a diagnosed model's effects say is drawn from its posterior, the rest is added to it."""
+        their own; parameters of a diagnosed model's effects are drawn from its posterior, the rest is added to it."""
         rng = np.random.default_rng([seed, 20])
         legs = sorted({j for leg in legs_of(model) for j in leg.joints}) if count else []
         return [self._draw(model, legs, rng, folder) for _ in range(count)]
@@ -102,7 +102,7 @@ def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -
 
 
 def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = None) -> Ensemble:
-    """Reads the file (default: the one that ships). InputError names file, key and what was expected."""
+    """Reads the file (default: the bundled one). InputError names file, key and the expected value."""
     path = data_file(BUNDLED) if path is None else Path(path)
     top = Fields(path, read_yaml(path))
     if top.raw("format") != 1:
@@ -138,7 +138,7 @@ def _diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
 
 
 def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Generator) -> RobotModel:
-    """The diagnosed model with its effects' parameters drawn together, kept within what the effects allow."""
+    """The diagnosed model with its effects' parameters drawn jointly, kept within the effects' bounds."""
     from workbench.effects.registry import effect_named
 
     assert list(posterior.names) == list(parameter_names(model.effects))

@@ -33,13 +33,13 @@ which over half a metre would be told as drift."""
 BROKEN = 2.0
 """Cost of breaking a limit by a factor of e: a tenth over a limit costs the puppy 0.27 m/s."""
 LEAD = 0.03
-"""At rest before the first command [s], by which feet that stand are told from feet that do not."""
+"""At rest before the first command [s], in which the feet that carry the robot are identified."""
 SEARCH = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_period=0.01)
 """While searching: 2 ms and 1 ms agree to a hundredth in speed."""
 
 
 def table_sha256(*tables: PoseTable) -> str:
-    """Of what the firmware plays: joints, goals, speeds, dwells, and which poses are played once."""
+    """Parts of the firmware's table: joints, goals, speeds, dwells, and which poses are played once."""
     digest = hashlib.sha256()
     for t in tables:
         said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
@@ -50,8 +50,8 @@ def table_sha256(*tables: PoseTable) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A gait with what is known of it. nominal: None where its table alone breaks a limit. draws: on the ensemble's robots, empty
-    where that was not worth it. margins: of all limits. cost: to be made small."""
+    """A gait and its results. nominal: None where its table alone breaks a limit. draws: on the ensemble's robots, empty
+    where that was not worth it. margins: of each limit. cost: to be minimised."""
 
     table: GaitTable
     margins: tuple[Margin, ...]
@@ -66,7 +66,7 @@ class Candidate:
 
     @cached_property
     def violation(self) -> float:
-        """By how much limits are broken in all; 0 where none is."""
+        """Sum of the excess over broken limits; 0 where none is broken."""
         return violation(self.margins) + (0.0 if self.nominal else 10.0)
 
     @property
@@ -76,17 +76,17 @@ class Candidate:
 
     @property
     def merit(self) -> float:
-        """Cost with what is broken, to be made small; a gait that breaks a limit a little may lead to a better one that keeps
-        it, so that it is no rank of its own."""
+        """Cost plus penalty for broken limits, to be minimised; a gait that breaks a limit slightly may lead to a better one that
+        keeps it, so that it is not ranked separately."""
         return min(self.cost, 10.0) + BROKEN * self.violation
 
     def rank(self) -> tuple[bool, float]:
-        """For sorting: what keeps all limits first, by cost; the rest by cost and what it breaks."""
+        """For sorting: gaits that keep all limits first, by cost; the rest by cost plus penalty."""
         return (not self.good, self.merit)
 
 
 class Evaluator:
-    """Simulates gaits of one request. memory: a file in which measures are kept, so that a run that was stopped goes on.
+    """Simulates gaits of one request. memory: file of measures, so that an interrupted run continues.
     seconds: of walking, after the first cycle."""
 
     def __init__(self, machine: GaitMachine, request: Request, draws: Sequence[RobotModel], memory: Path | None = None,
@@ -102,8 +102,8 @@ class Evaluator:
 
     def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
                ) -> list[Candidate]:
-        """The shapes as candidates, in their order. draws: on how many of the ensemble's robots those are tried which `keep`
-        (default: all that keep the limits so far) picks from what they do on the nominal robot."""
+        """The shapes as candidates, in their order. draws: number of the ensemble's robots on which the candidates selected by
+        `keep` are tried (default: all that keep the limits so far on the nominal robot)."""
         new = [s for s in dict.fromkeys(shapes) if s not in self._tables]
         self._tables.update({p.shape: self._table(p) for p in paths_of(self.machine, new)})
         tables = [self._tables[s] for s in shapes]
@@ -120,7 +120,7 @@ class Evaluator:
         return out
 
     def measured(self, runs: Sequence[tuple[GaitShape, RobotModel]]) -> list[GaitMeasure]:
-        """What each shape does on a robot of its own, which is on the slope already. InputError where a goal is beyond the
+        """Measures of each shape on a robot of its own, which is on the slope already. InputError where a goal is beyond the
         registers."""
         return self._measures([(gait_table(self.machine, shape), robot) for shape, robot in runs])
 
@@ -166,7 +166,7 @@ class Evaluator:
         return [self._known[k] for k in keys]
 
     def _simulate(self, wanted: Mapping[str, tuple[GaitTable, RobotModel]], as_seen: bool) -> None:
-        """Into what is known, and into the memory."""
+        """Adds to the known results, and to the memory."""
         jobs, lines = [], []
         for table, model in wanted.values():
             cycles = max(CYCLES, math.ceil(self.seconds / table.period))
@@ -188,7 +188,7 @@ def _of_table(margin: Margin) -> bool:
 
 
 def _read(path: Path | None) -> dict[str, GaitMeasure]:
-    """What an earlier run wrote; a last line that was cut off is left out."""
+    """Results of an earlier run; a last line that was cut off is left out."""
     known: dict[str, GaitMeasure] = {}
     if path is None or not path.is_file():
         return known

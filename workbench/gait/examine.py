@@ -36,8 +36,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "2 ms": {"time_step": 2e-3}, "1 ms": {"time_step": 1e-3}, "0.5 ms": {"time_step": 5e-4},
     "sap": {"time_step": 2e-3, "approximation": "sap"}, "similar": {"time_step": 2e-3, "approximation": "similar"},
     "hydroelastic": {"time_step": 2e-3, "contact": "hydroelastic"}}
-"""Ways to compute the same: steps, contact approximations of Drake, hydroelastic feet; what has no step in its name is compared
-at 2 ms, which is what the floor of the steps allows for."""
+"""Numerical variants: steps, contact approximations of Drake, hydroelastic feet; a variant without a step in its name is compared
+at 2 ms, which the floor of the steps allows."""
 LEAD = 0.3
 """At rest before the first command [s]."""
 REST, SHORT_REST = 1.0, 0.3
@@ -53,12 +53,12 @@ class CertifyOptions:
 
     seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots
     of the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too,
-    beside the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the
+    in addition to the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the
     same discrete step is compared. compared_seconds: of walking in each condition in which another engine plays the table too
-    [s]; compared: by which share of the nominal speed the two may differ there: contact models differ by a tenth where feet
-    slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. watched:
-    cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. trimmed: how many of the draws are
-    straightened by what they record of themselves, metre by metre; 0: none. n_jobs: processes."""
+    [s]; compared: allowed difference there, as a share of the nominal speed: contact models differ by a tenth where feet
+    slide. variants: of VARIANTS, which give the numerical floor, floor_seconds each [s]. watched:
+    cycles of each run in which the return of the gait to its cycle is examined; 0: it is not. trimmed: how many of the draws are
+    straightened by their own recordings, metre by metre; 0: none. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -124,7 +124,7 @@ class Examiner:
         return 1 + max(2, math.ceil(seconds / self.table.period))
 
     def _ways(self, take: Take) -> Ways:
-        """Of the parts of a whole run: start, gait, stop, and what follows."""
+        """Parts of a whole run: start, gait, stop, and the rest after it."""
         assert take.p_WB is not None
         begin, end = self.table.start_seconds, self._walked_until(self.options.seconds)
         over = end + float(self.table.stop.dwells_ms.sum()) / 1000

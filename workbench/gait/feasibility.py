@@ -1,4 +1,4 @@
-"""What no gait can do, known before any search."""
+"""Limits that rule a request out before any search."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ as fast again as their feet."""
 
 
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
-    """What no gait can do: speed beyond what feet reach at the servos' no-load speed, or that no path of feet has within the
-    ranges and speeds of joints; a slope beyond friction; servos that may give less than standing takes. InputError for a limit on
-    torque above what the servos have."""
+    """The first limit that no gait can meet: a speed beyond the feet's at the servos' no-load speed, or that no path of feet has
+    within the ranges and speeds of joints; a slope beyond friction; a torque limit below the torque of standing. InputError for a
+    limit on torque above the torque of the servos."""
     most = float(machine.law.full_torque.max())
     if request.limits.rms is not None and request.limits.rms > most:
-        raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, what the servos give at full duty, "
+        raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, the servos' torque at full duty, "
                                f"got {request.limits.rms:g}")
-    for margin in (_foot_speed(machine, request), _slope(machine, request), _standing(machine, request)):
+    for margin in (_foot_speed(machine, request), _slope(machine, request), _standing_torque(machine, request)):
         if margin is not None and margin.use > 1:
             return margin
     return _path(machine, request)
@@ -65,7 +65,7 @@ def _slope(machine: GaitMachine, request: Request) -> Margin | None:
     return Margin("slope", f"friction {friction:g}", slope, bound, "deg", slope / bound, kind="slope")
 
 
-def _standing(machine: GaitMachine, request: Request) -> Margin | None:
+def _standing_torque(machine: GaitMachine, request: Request) -> Margin | None:
     """Least over crouches and knees of the largest static torque, as far as friction does not hold it."""
     if request.limits.rms is None:
         return None

@@ -1,4 +1,4 @@
-"""What the feet of a simulated gait did: slip, clearance, and how far the robot was from tipping over."""
+"""The feet of a simulated gait: slip, clearance, and the margin against tipping over."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 TOUCHING = 1e-3
-"""Height of a foot's lowest point [m], over where it stands at rest, below which it carries load: there points of 1e4 N/m give
-way by 0.3 mm, loaded twice as much by as much again."""
+"""Height of a foot's lowest point [m], above that at rest, below which it carries load: there points of 1e4 N/m yield by 0.3 mm,
+loaded twice as much by another 0.3 mm."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class FeetMeasure:
 
 def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float, end: float = math.inf,
                  ) -> FeetMeasure:
-    """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping of all of it. Feet are
-    where the model's kinematics put them; what counts of a tilted one is its lowest point."""
+    """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping over the whole take. Positions of
+    feet are from the model's kinematics; for a tilted foot its lowest point counts."""
     height, speed = _lowest(take, model, legs)  # speed (N-1, F), between rows
     inside = (take.time >= begin - 1e-9) & (take.time <= end + 1e-9)
     z = height - _floor(height, take.time < 0)

@@ -48,7 +48,7 @@ def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Seque
 
 
 def _with_draws(nominal: Candidate, drawn: Candidate) -> Candidate:
-    """What is known of a gait from the longer walk of the nominal robot, with what is known from others."""
+    """Results of a gait from the longer walk of the nominal robot, together with those from others."""
     own = {m.name for m in nominal.margins} - {FALLS}
     margins = [m for m in nominal.margins if m.name in own] + [m for m in drawn.margins if m.name not in own]
     return replace(nominal, margins=tuple(margins), draws=drawn.draws, cost=drawn.cost)

@@ -121,7 +121,7 @@ def _entries(table: GaitTable, watched: int, other: PoseTable | None) -> list[_E
 
 
 def _pushed(take: Take, table: GaitTable, watched: int, model: RobotModel) -> _Entry:
-    """The run from neutral goes on from a beginning of its loop, with a velocity to the left on top."""
+    """The run from neutral, continued from a beginning of its loop, with an additional velocity to the left."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     assert take.v is not None

@@ -22,21 +22,22 @@ from workbench.gait.table import GaitTable
 class GaitLimits:
     """Limits that a gait has to keep. Each field: unit and reason. InputError for a number that is not positive.
 
-    rms: torque of each servo [N m], RMS over the gait; None: half of what full duty gives at standstill. ROBOTIS advises a fifth,
-    which its own walk of the puppy exceeds by far (the tail's 0.80 N m of 1.39); half is below what that walk needs and gives I²R
-    heat of a quarter of a stalled servo's, for minutes and not for hours. The fifth is reported as advice. torque: share of the
-    torque-speed line that may be used for 10 ms or longer; the rest of it is where a servo stops following. fuse: supply current
-    [A] (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
+    rms: torque of each servo [N m], RMS over the gait; None: half the torque at full duty at standstill. ROBOTIS advises a fifth,
+    which its own walk of the puppy exceeds by far (the tail's 0.80 N m of 1.39); half is below the need of that walk and gives
+    I²R heat of a quarter of a stalled servo's, for minutes and not for hours. The fifth is reported as advice. torque: share of
+    the torque-speed line that may be used for 10 ms or longer; beyond it a servo stops following. fuse: supply current [A]
+    (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
     links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
-    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
-    ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides hangs on friction, which is known
-    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.36 of
-    the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where the
-    feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]:
-    3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and latency is seen
-    on its first metre, and another `turn` corrects it. trimmed: what three recorded metres and three corrections leave of it, RMS
-    over draws [rad/m]: 10 deg; a tenth of a right angle in a metre is for a controller. aside: sideways speed by forward speed.
-    back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
+    twice the sag from a degree of play in a knee; where feet drag, the floor decides how they move. slip: speed over the
+    ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides depends on friction, which is the
+    least known. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at
+    0.36 of the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg,
+    where the feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot
+    [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and
+    latency is seen on its first metre, and another `turn` corrects it. trimmed: the residual after three recorded metres and
+    three corrections, RMS over draws [rad/m]: 10 deg; a tenth of a right angle in a metre is for a controller. aside: sideways
+    speed by forward speed. back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two
+    to four seconds.
     """
 
     rms: float | None = None
@@ -60,15 +61,15 @@ class GaitLimits:
 
 
 Kind = Literal["table", "run", "speed", "straying", "slope"]
-"""What a limit hangs on: the table alone, known without a simulation; a run; the speed that is required; a turn that steering can
-take out; the slope, on which nothing stands."""
+"""Dependence of a limit: on the table alone, known without a simulation; on a run; on the required speed; on a turn that steering
+can remove; on the slope, for which there is no nearest table."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """How near a limit is. name: of the limit. value, limit: in `unit`; a limit from below says so in its unit. where: a joint, a
+    """Margin of a limit. name: of the limit. value, limit: in `unit`; the unit of a lower limit mentions that. where: a joint, a
     foot, two links, or the robot. use: value divided by limit; above 1 the limit is broken. advice: whether it is only a
-    recommendation. kind: what it hangs on."""
+    recommendation. kind: its dependence."""
 
     name: str
     where: str
@@ -81,7 +82,7 @@ class Margin:
 
     @property
     def margin(self) -> float:
-        """What is left, as a share of the limit; negative where it is broken."""
+        """Remaining margin, as a share of the limit; negative where it is broken."""
         return 1.0 - self.use
 
     def __str__(self) -> str:
@@ -95,7 +96,7 @@ def allowed_rms(machine: GaitMachine, limits: GaitLimits) -> np.ndarray:
 
 
 def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> list[Margin]:
-    """What is known without a simulation: ranges, moving speeds, reach, self-contact, bus time, the controller's memory."""
+    """Limits that need no simulation: ranges, moving speeds, reach, self-contact, bus time, the controller's memory."""
     model, out = machine.model, []
     for part in (table.cycle, table.start, table.stop):
         angles = part.angles()
@@ -130,7 +131,7 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
     allowed = allowed_rms(machine, limits)
     for i, joint in enumerate(machine.model.joints):
         out.append(_of("RMS torque", joint, measure.rms[i], float(allowed[i]), "N m"))
-        out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of what it has"))
+        out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of the torque available"))
         out.append(_of("RMS torque, ROBOTIS's fifth", joint, measure.rms[i], float(law.full_torque[i]) / 5, "N m", advice=True))
     if np.isfinite(measure.clearance):
         out.append(clearance_margin(limits, measure))
@@ -172,7 +173,7 @@ def _of(name: str, where: str, value: float, limit: float, unit: str, use: float
 
 
 def least(name: str, where: str, value: float, limit: float, unit: str, kind: Kind = "run") -> Margin:
-    """A limit from below: use is 1 where the value is just enough, and grows by what is missing, as a share of the limit; 0 from
+    """A lower limit: use is 1 where the value is just sufficient, and grows by the deficit, as a share of the limit; 0 from
     twice the limit on."""
     return Margin(name, where, float(value), float(limit), f"{unit}, at least", max(2.0 - float(value / limit), 0.0),
                   kind=kind)

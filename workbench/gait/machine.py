@@ -122,8 +122,9 @@ class GaitMachine:
         return [(q[b - len(path.p):b], off[b - len(path.p):b], path.stance) for path, b in zip(paths, ends)]
 
     def droop(self, shape: GaitShape, q: Array, stance: NDArray[np.bool_]) -> Array:
-        """What the reference must be ahead of the joints (P, n) [rad], so that the servos' duty gives what the gait takes at its
-        poses: the inverse of the servo law on inverse dynamics of the joints' periodic path q (P, n), the body going evenly."""
+        """Lead of the reference over the joints (P, n) [rad], such that the servos' duty gives the torque of the gait at its
+        poses: the inverse of the servo law on inverse dynamics of the joints' periodic path q (P, n), at constant body
+        velocity."""
         P, period = len(q), shape.period
         v = _periodic(q, period, 1)
         a = _periodic(q, period, 2)

@@ -1,4 +1,4 @@
-"""What a simulated gait did, as numbers: speed, heading, falls, torque, current, power, jerk."""
+"""Measures of a simulated gait: speed, heading, falls, torque, current, power, jerk."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class GaitMeasure:
     """One run, over whole cycles after the first. N m, m, rad, s, A, W.
 
     fell: at any time. velocity: forward and left [m/s], in the base's own heading. turn_rate [rad/s], to the left. gone: distance
-    between the ends [m]; drift: change of heading on the way [rad], lateral: beside the first heading [m]. tilt: largest [rad].
+    between the ends [m]; drift: change of heading on the way [rad], lateral: across the first heading [m]. tilt: largest [rad].
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
-    electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
-    cycles of how high a foot comes [m]; slip: mean speed over the ground of feet that touch it [m/s]; both NaN where nobody
-    looked. peak: of each joint, the largest torque that lasts LASTING, over the same time as torque_use. scatter: from one of the
-    cycles to the next, as `Scatter`. touched: whether something other than a foot touched the floor, or links each other, in a
-    run that was not a fall.
+    electrical; mechanical: mean output of the joints. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
+    cycles of a foot's greatest height [m]; slip: mean speed over the ground of feet that touch it [m/s]; both NaN where not
+    measured. peak: of each joint, the largest torque that lasts LASTING, over the same time as torque_use. scatter: from one of
+    the cycles to the next, as `Scatter`. touched: whether something other than a foot touched the floor, or links each other, in
+    a run that was not a fall.
     """
 
     fell: bool
@@ -140,7 +140,7 @@ def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
     """Current [A] and power [W] (N,) that servos and controller draw from the supply.
 
     A servo's H-bridge passes the motor's current for the duty's share of the time: supply current is duty times motor torque over
-    torque per ampere. What a driven motor gives back is not credited. The duty is that of the servo law on the ramped reference
+    torque per ampere. The output of a driven motor is not credited. The duty is that of the servo law on the ramped reference
     that reached the servos and the servos' own angles.
     """
     q = take.q if take.servo_q is None else take.servo_q

@@ -27,6 +27,7 @@ from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.plan_compare import PlanComparison, compare_plan
 from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
 from workbench.gait.planned import planned_seeds
+from workbench.gait.refine import RefineOptions, refined
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -47,13 +48,13 @@ MEMORY = ".rollouts.jsonl"
 IN_HAND = 0.05
 """By which a search goes beyond the required speed, which the certificate asks for after its numerical floor."""
 DRIFT_SOUGHT = 10.0
-"""Times the drift allowed on the nominal robot that a search allows itself: what a gait turns evenly is trimmed afterwards."""
+"""Multiple of the drift limit on the nominal robot that a search allows: a steady turn is trimmed afterwards."""
 SCREENED = 1_000_000
 """Seed of the finalists' robots, beyond those of searches and certificates."""
 FIRST_LOOK = Budget(seeds=60, screened=6, starts=2, generations=4, draws=4)
-"""Beside a refusal: what works instead, in half a minute."""
+"""Effort of the search for an achievable value after a refusal, half a minute."""
 BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, variants=("2 ms", "1 ms", "0.5 ms"))
-"""How the nearest table beside a refusal is examined at most, so that a refusal comes within a minute."""
+"""Reduced examination of the nearest table after a refusal, so that a refusal comes within a minute."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,7 @@ class OptimizeOptions:
     simulate. given: gaits to start from; planned: whether the search also starts from solved kino-centroidal programmes.
     screening: how the search's best are tried on fresh robots before the certificate. method: "search"; "plan": the joint paths
     of solved programmes as tables, without a search; "both": a search that begins at those, too.
+    refine: Gauss-Newton on the best gait's joint angles afterwards.
     InputError for a number out of range, or a method that is not known."""
 
     budget: Budget = field(default_factory=Budget)
@@ -73,6 +75,7 @@ class OptimizeOptions:
     planned: bool = True
     screening: Screening = field(default_factory=Screening)
     method: Method = "search"
+    refine: RefineOptions = field(default_factory=RefineOptions)
 
     def __post_init__(self) -> None:
         check_whole(self, seed=0, n_jobs=1)
@@ -83,11 +86,11 @@ class OptimizeOptions:
 class Optimized:
     """Result of a search.
 
-    request: what was searched for. met: whether the gait keeps every limit and the required speed. problem: where it does not, in
-    a line: which limit binds, and what works. table: poses in counts and milliseconds (`cycle`, `start` from neutral, `stop`);
-    certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every limit, or
-    None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was needed.
-    plan: of a planned gait, what was planned beside what it does.
+    request: that was searched. met: whether the gait keeps every limit and the required speed. problem: where it does not, in
+    a line: the binding limit, and the achievable value. table: poses in counts and milliseconds (`cycle`, `start` from neutral,
+    `stop`); certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every
+    limit, or None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was
+    needed. plan: of a planned gait, its plan and its motion.
     """
 
     request: Request
@@ -114,10 +117,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
+        before, found = found.best, refined(evaluator, found, options.refine, progress)
+        plans = plans.with_refined(before.shape, found.best.shape)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
             "ensemble_sha256": ensemble.sha256, "method": options.method, "generations": found.generations,
-            "rollouts": found.rollouts, "searched in": round(time.monotonic() - began, 1)}
+            "rollouts": found.rollouts, "refined": found.best is not before, "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
@@ -155,7 +160,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
-    """What a method finds; None where nothing was planned that has a table."""
+    """Result of a method; None where no plan led to a table."""
     if options.method == "plan":
         return chosen(evaluator, plans, progress)
     if options.planned:
@@ -214,7 +219,8 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     said = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
-    look = replace(options, method="search", budget=FIRST_LOOK, certify=_briefly(options.certify))
+    look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
+                   certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
         said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
@@ -230,7 +236,7 @@ def walk_speed(model: RobotModel) -> float:
 
 
 def robotis_walk(model: RobotModel) -> GaitMeasure:
-    """What the ROBOTIS walk does on this robot in six seconds. InputError for a robot that has not its joints."""
+    """The ROBOTIS walk on this robot in six seconds. InputError for a robot that does not have its joints."""
     try:
         motion = load_motion(data_file(WALK), model)
     except InputError:
@@ -251,7 +257,7 @@ def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Pat
 
 
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
-    """In a line: what binds, by how much, and what works."""
+    """One line: the binding limit, its excess, and the achievable value."""
     said = f"{request}: not met"
     limit = binding(_without_speed(margins))
     if limit is not None:
@@ -281,4 +287,4 @@ def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
                      draws=4 if effort == 1 else budget.draws)
     if effort == 1:
         examined = replace(examined, draws=FEWEST, checked=0, seconds=4.0)
-    return OptimizeOptions(budget, examined, seed, n_jobs)
+    return OptimizeOptions(budget, examined, seed, n_jobs, refine=RefineOptions(iterations=1 if effort == 1 else 2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,11 @@ class Plans:
     solved: Mapping[Offsets, Planned] = field(default_factory=dict)
     shapes: tuple[GaitShape, ...] = ()
     asked: int = 0
+
+    def with_refined(self, before: GaitShape, after: GaitShape) -> Plans:
+        """With the programme behind one shape also behind another that was refined from it."""
+        planned = self.of(before)
+        return self if planned is None else replace(self, solved={**self.solved, after.offsets: planned})
 
     def of(self, shape: GaitShape) -> Planned | None:
         """The programme behind a shape; None of one that was not planned."""

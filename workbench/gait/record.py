@@ -1,4 +1,4 @@
-"""What a certificate says of the nominal robot, as types: each field under a key of the file that says its unit."""
+"""Results of the nominal robot in a certificate, as types: each field under a key of the file with its unit."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Steadiness:
 
 
 def to_plain(record: Any) -> dict[str, Any]:
-    """A record under the keys of the file; what has its default is left out."""
+    """A record under the keys of the file; fields with their default are left out."""
     out = {}
     for f in fields(record):
         value = getattr(record, f.name)

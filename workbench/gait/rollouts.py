@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 from workbench.recording.take import Take
 from workbench.simulation import Job, simulate_batch
+from workbench.simulation.cluster import in_blocks, on_cluster
 from workbench.simulation.compiled import CompiledJob, NotCoveredError, covers
 
 KEPT = 64
@@ -15,7 +17,7 @@ KEPT = 64
 
 
 class Rollouts:
-    """Plays gaits on robots again and again; what does not depend on the gait is worked out once for each robot."""
+    """Plays gaits on robots repeatedly; everything independent of the gait is computed once for each robot."""
 
     def __init__(self, n_jobs: int = 2) -> None:
         self.n_jobs = n_jobs
@@ -29,6 +31,9 @@ class Rollouts:
             return
         if covers(jobs[0]) is not None:  # the kind is the same for all: engine, contact, step
             yield from simulate_batch(jobs, self.n_jobs)
+            return
+        if self.n_jobs > 1 and len(jobs) > 1 and on_cluster():
+            yield from in_blocks(partial(_played, as_seen), jobs, self.n_jobs)
             return
         prepared = [self._prepared(job) for job in jobs]
         if self.n_jobs == 1:
@@ -48,6 +53,15 @@ class Rollouts:
             return self._robots[key].of(job)
         except NotCoveredError:
             return None
+
+
+_of_this_process = Rollouts(1)
+"""A worker's own, so that it settles each robot once however many blocks it gets."""
+
+
+def _played(as_seen: bool, jobs: Sequence[Job]) -> list[Take | None]:
+    """A block of jobs, in a worker."""
+    return list(_of_this_process.takes(jobs, as_seen))
 
 
 def _take(job: CompiledJob | None, as_seen: bool) -> Take | None:

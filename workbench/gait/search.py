@@ -30,7 +30,7 @@ TRIED = 0.6
 ALIKE = 4
 """How many seeds of one family and one way of the knees are tried on the ensemble's robots."""
 IN_TURN = 3
-"""Generations of each start before the best of them goes on alone."""
+"""Generations of each start before only the best of them continues."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Budget:
     number out of range.
 
     seeds: random gaits at first, on the nominal robot. screened: the best of them, which are tried on `draws` robots of the
-    ensemble. starts: the best of those, of different families or knees, from which CMA-ES goes on. population: of each
-    generation, all on the nominal robot, the better on the ensemble too. generations: in all. width: first standard deviation
+    ensemble. starts: the best of those, of different families or knees, from which CMA-ES continues. population: of each
+    generation, all on the nominal robot, the better on the ensemble too. generations: in total. width: first standard deviation
     in the unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit.
     hopeless: it ends halfway if the best gait has less than this share of the speed. finalists: gaits that may go to the
     certificate.
@@ -64,8 +64,8 @@ class Budget:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search ended with. best: the best gait; nearest: the best that keeps all limits but the required speed, if `best`
-    does not keep that; generations and rollouts: how many it took; others: that come next and differ, the best first."""
+    """Result of a search. best: the best gait; nearest: the best that keeps all limits but the required speed, if `best`
+    does not keep that; generations and rollouts: how many it took; others: the next best that differ, the best first."""
 
     best: Candidate
     nearest: Candidate | None
@@ -80,7 +80,7 @@ class Found:
 
 
 def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, given: Sequence[GaitShape] = ()) -> Found:
-    """Searches for a gait for the evaluator's request. given: shapes to start from, beside the random ones."""
+    """Searches for a gait for the evaluator's request. given: initial shapes, in addition to the random ones."""
     space = space_of(evaluator.machine, evaluator.request)
     run = _Run(evaluator, budget, space, progress)
     shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]
@@ -96,7 +96,7 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
 
 
 class _Run:
-    """What is known so far."""
+    """Results so far."""
 
     def __init__(self, evaluator: Evaluator, budget: Budget, space: Space, progress: Progress) -> None:
         self.evaluator, self.budget, self.space, self.progress = evaluator, budget, space, progress
@@ -108,7 +108,7 @@ class _Run:
         self._seen: list[Candidate] = []
 
     def seeded(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
-        """Where to start: what does best on the ensemble of the best seeds, each of another family or another way of the
+        """Starting points: the best on the ensemble of the best seeds, each of another family or another way of the
         knees."""
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
@@ -140,10 +140,10 @@ class _Run:
         assert self.best is not None
         self._streak = self._streak + 1 if self.best.good else 0
         done = self.generation / self.budget.generations
-        self.progress(f"generation {self.generation} of {self.budget.generations}{self._told()}", done)
+        self.progress(f"generation {self.generation} of {self.budget.generations}{self._describe()}", done)
 
     def others(self) -> tuple[Candidate, ...]:
-        """What comes next and differs from what comes before it."""
+        """The next best that differ from those before them."""
         out = [] if self.best is None else [self.best]
         for c in sorted(self._seen, key=Candidate.rank):
             if len(out) >= self.budget.finalists:
@@ -155,7 +155,7 @@ class _Run:
         return tuple(out[1:])
 
     def hopeless(self) -> bool:
-        """Whether the required speed is far from what was found."""
+        """Whether the required speed is far from the best so far."""
         asked, found = self.evaluator.request.speed, self.nearest or self.best
         if asked is None or found is None or found.nominal is None:
             return False
@@ -176,14 +176,14 @@ class _Run:
                 self.nearest = c
 
     def _known(self, c: Candidate) -> bool:
-        """Sorts what was tried on the ensemble first."""
+        """Sorts candidates tried on the ensemble first."""
         return len(c.draws) < self.draws
 
     def _speed(self, c: Candidate) -> float:
         assert c.nominal is not None
         return self.evaluator.request.progress(c.nominal)
 
-    def _told(self) -> str:
+    def _describe(self) -> str:
         """The best so far in words, with the limit that binds."""
         if self.best is None or self.best.nominal is None:
             return ""
@@ -204,7 +204,7 @@ def keeps_all_but_speed(c: Candidate) -> bool:
 
 
 class _Refiner:
-    """One CMA-ES over the ensemble: what was tried on it comes first, by cost and what it breaks."""
+    """One CMA-ES over the ensemble: candidates tried on it come first, by cost plus penalty."""
 
     def __init__(self, run: _Run, start: Candidate, seed: int) -> None:
         self._run, self._start = run, start.shape
@@ -216,7 +216,7 @@ class _Refiner:
         self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
 
     def _shape(self, x: Array) -> GaitShape:
-        """At a point of the unit cube; what was added to a planned start's angles at its poses stays."""
+        """The shape at a point of the unit cube; angles added to a planned start's poses are kept."""
         shape, start = self._run.space.shape(x, self._family, self._knees), self._start
         return replace(shape, poses=start.poses, offsets=start.offsets) if start.offsets else shape
 

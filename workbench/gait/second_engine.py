@@ -23,7 +23,7 @@ AT_ONCE = "from neutral at once"
 
 @dataclass(frozen=True)
 class Condition:
-    """One robot and entry that both engines play. effects: beside the model's own. at_once: without the way in."""
+    """One robot and entry that both engines play. effects: in addition to the model's own. at_once: without the start."""
 
     name: str
     effects: tuple[EffectSpec, ...] = ()
@@ -47,7 +47,7 @@ Pair = tuple[GaitMeasure, GaitMeasure]
 
 
 def summary(request: Request, name: str, pairs: Mapping[str, Pair]) -> dict[str, object]:
-    """What a certificate says of the comparison, speeds in the request's unit. pairs: by condition, the nominal one too."""
+    """The comparison, for a certificate; speeds in the request's unit. pairs: by condition, the nominal one too."""
     ours, theirs = pairs[AS_IT_IS]
     nominal = max(abs(request.progress(ours)), 1e-9)
     rows = {k: {"speed": request.progress(a), "speed elsewhere": request.progress(b),

@@ -21,7 +21,7 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "duty": (0.40, 0.80), "sway_phase": (0.0, 1.0), "apex": (-0.25, 0.25), "lag": (-0.12, 0.12), "lead": (0.0, 1.3),
     "hurry": (0.8, 2.0)}
 TRIM = 0.06
-"""Turn in a stance [rad] by which a straight gait steers against its own drift: robots are not quite alike left and right."""
+"""Turn in a stance [rad] by which a straight gait steers against its own drift: robots are not exactly symmetric."""
 MOST_TURN = 1.2
 """Of the body in one stance [rad]."""
 POSES = (2.0, 8.0)
@@ -32,12 +32,12 @@ PUPPY_LEG = 0.1835
 WEIGHTS: Mapping[str, float] = {"trot": 0.5, "walk": 0.15, "crawl": 0.1, "bound": 0.125, "pace": 0.125}
 """How often a seed is of each family."""
 MOST_BATCHES = 10
-"""After so many batches of twice what is wanted, a robot whose legs reach next to nothing has to do with fewer seeds."""
+"""After so many batches of twice the requested number, a robot whose legs reach next to nothing gets fewer seeds."""
 
 
 @dataclass(frozen=True)
 class Space:
-    """Names and ranges (n,) of what is searched for, in SI. poses are halves of their number and whole."""
+    """Names and ranges (n,) of the search variables, in SI. poses are halves of their number and whole."""
 
     names: tuple[str, ...]
     low: Array
@@ -98,7 +98,7 @@ def _sided(request: Request, least: float, most: float) -> tuple[float, float]:
 
 
 def seeds(machine: GaitMachine, request: Request, space: Space, count: int, seed: int) -> list[GaitShape]:
-    """Random shapes of all families and ways of the knees that legs can reach, the same for the same seed."""
+    """Random shapes of every family and knee direction that legs can reach, the same for the same seed."""
     rng = np.random.default_rng([seed, 10])
     out: list[GaitShape] = []
     for _ in range(MOST_BATCHES):

@@ -1,9 +1,9 @@
 """Seeds by trajectory optimisation: a kino-centroidal programme with a footfall schedule, on SNOPT or IPOPT.
 
-Over one cycle of N knots the unknowns are the base's pose and twist, the angles of all leg joints, the feet's forces, and where
-each foot stands (after H. Dai, A. Valenzuela, R. Tedrake, Humanoids 2014, with the footfalls prescribed). The robot is one
-rigid body at its neutral inertia, its legs massless; tilts are small. Joint ranges and speeds, friction, and the torque that
-forces ask of the joints (through the legs' Jacobians in the middle of the path) are bounds.
+Over one cycle of N knots the unknowns are the base's pose and twist, the angles of the leg joints, the feet's forces, and the
+footholds (after H. Dai, A. Valenzuela, R. Tedrake, Humanoids 2014, with the footfalls prescribed). The robot is one
+rigid body at its neutral inertia, its legs massless; tilts are small. Joint ranges and speeds, friction, and the joint torques
+caused by the forces (through the legs' Jacobians in the middle of the path) are bounds.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOST_ITERATIONS = 300
 
 @dataclass(frozen=True)
 class Task:
-    """What the programme is asked: a footfall schedule and a motion. velocity: forward, left [m/s]; turn_rate [rad/s]; slope
+    """Task of the programme: a footfall schedule and a motion. velocity: forward, left [m/s]; turn_rate [rad/s]; slope
     [rad] uphill. shape: family, knees, frequency, duty, lift and crouch to begin with."""
 
     name: str
@@ -46,9 +46,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Planned:
-    """What came out. solved: whether a solver says so; solver, seconds: which, and how long. q (N, n) [rad] at the knots, of all
-    joints; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m], tilt (N, 3) [rad] of the base off the frame that goes along; shape:
-    the gait nearest to it in numbers, a seed."""
+    """Solution. solved: whether a solver succeeded; solver, seconds: which, and how long. q (N, n) [rad] at the knots, of every
+    joint; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m], tilt (N, 3) [rad] of the base off the moving frame; shape:
+    the gait with the closest parameters, a seed."""
 
     task: Task
     solved: bool
@@ -237,7 +237,7 @@ class _Foot:
 
 
 class _Turning:
-    """Change of angular momentum less what the forces' moments give over an interval (3,) [N m s]."""
+    """Change of angular momentum less the integrated moments of the forces over an interval (3,) [N m s]."""
 
     def __init__(self, feet: Array, inertia: Array, dt: float, com: Array) -> None:
         self.feet, self.inertia, self.dt, self.com = feet, inertia, dt, com
@@ -275,7 +275,7 @@ def _com(machine: GaitMachine) -> Array:
 
 def _inertia(machine: GaitMachine) -> Array:
     """About the centre of mass in neutral (3, 3) [kg m^2], of links as points: leg links are far from it and their own inertias
-    small beside that; the base link's own is a third of what is missing."""
+    small in comparison; the base link's own is a third of the missing part."""
     k, com = machine.model.kinematics, _com(machine)
     poses = k.forward(np.zeros((1, len(k.joints))))
     out = np.zeros((3, 3))

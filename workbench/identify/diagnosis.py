@@ -22,7 +22,7 @@ from workbench.identify.estimators.geometry import Geometry, geometry_of
 from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
-from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -76,7 +76,7 @@ class _Settings:
     @property
     def options(self) -> EvidenceOptions:
         """Of the search of servo logs."""
-        return EvidenceOptions(drift=None if self.previous is None else SinceThen())
+        return EvidenceOptions() if self.previous is None else EvidenceOptions.since()
 
     def provenance(self) -> dict[str, object]:
         """These options, as the results record them."""
@@ -140,11 +140,10 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], SearchResult] = explained_by_selection
-    if gap and is_by_logs(evidence):
-        search = explained_by_evidence
+    search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
+    options = settings.options if gap else settings.options.without_names()
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
-                           progress, settings.options))
+                           progress, options))
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)

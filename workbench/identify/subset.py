@@ -56,8 +56,8 @@ def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
                  if 0 < t - until[i] <= PROBLEM.looked_at - spent + 1e-9]
         if not steps:
             break
-        shown = {i: _shown(evidence[i], shares[i], until[i]) for i in fitted}
-        best, end = max(steps, key=lambda s: (_shown(evidence[s[0]], shares[s[0]], s[1]) - shown[s[0]]) / (s[1] - until[s[0]]))
+        shown = {i: _value_of(evidence[i], shares[i], until[i]) for i in fitted}
+        best, end = max(steps, key=lambda s: (_value_of(evidence[s[0]], shares[s[0]], s[1]) - shown[s[0]]) / (s[1] - until[s[0]]))
         until[best] = float(end)
     return [e.looked_at(until[i]) for i, e in enumerate(evidence)]
 
@@ -77,7 +77,7 @@ def _by_name(values: Array, channels: Sequence[str], names: Sequence[str]) -> Ar
     return out
 
 
-def _shown(e: TakeEvidence, shares: Array, until: float) -> float:
+def _value_of(e: TakeEvidence, shares: Array, until: float) -> float:
     """Value of including a take until then: the root favours errors that were not seen yet."""
     return float(np.sum(np.sqrt(shares[e.since <= until].sum(axis=0))))
 

@@ -1,1 +1,1 @@
-"""What a file is and what is wrong with it: recognised by content, checked against the robot that it belongs to."""
+"""Recognises files by their content and checks them against the robot they belong to."""

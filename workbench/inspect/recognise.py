@@ -1,4 +1,4 @@
-"""What a file is, recognised by its content, and what is wrong with it."""
+"""Recognises a file by its content, and lists its problems."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _RESULTS = {"findings": ("verdict", "findings"), "comparison": ("takes", "joints
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a file is.
+    """Description of a file.
 
     rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets,
-    markers or channels that have any; share_of_gaps: over all of them. details: what else its kind has to say.
+    markers or channels that have any; share_of_gaps: over all of them. details: further facts about its kind.
     """
 
     file: str
@@ -99,7 +99,7 @@ def inspect_file(file: str | Path, packages: Mapping[str, str] | None = None) ->
 
 
 def _folder(path: Path) -> Inspection:
-    """Firmware tables, a session, a recording that is a folder, or what a verb wrote."""
+    """Firmware tables, a session, a recording that is a folder, or the results of a verb."""
     if (path / "session.yaml").is_file():
         return _session(path / "session.yaml")
     if (path / "pos.txt").is_file():
@@ -147,9 +147,15 @@ def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:
 
 def _recording(path: Path) -> Inspection:
     from workbench.inspect.problems import recording_problems
+    from workbench.motion.trajectory import is_bag, trajectories
     from workbench.recording.formats.read import read_recording
 
-    r = read_recording(path)
+    try:
+        r = read_recording(path)
+    except InputError:
+        if is_bag(path) and trajectories(path):
+            return _motion(path)
+        raise
     missing = {name: np.isnan(body.p).any(axis=1) for name, body in r.rigid_bodies.items()}
     missing |= {name: np.isnan(p).any(axis=1) for name, p in r.markers.items()}
     missing |= {name: np.isnan(values) for name, values in r.channels.items()}
@@ -277,7 +283,7 @@ def _session(path: Path) -> Inspection:
 
 
 def _logged(session: Session) -> dict[str, str]:
-    """How servo logs were logged; nothing where the takes cannot be read, which is told as their problem."""
+    """How servo logs were logged; empty where the takes cannot be read, which is reported as their problem."""
     from workbench.compare.logged import how_logged
     from workbench.compare.session_takes import read_takes
 

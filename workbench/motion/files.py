@@ -16,6 +16,7 @@ from workbench.files.tables import plain_text
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
 from workbench.motion.table import MOST_CYCLES, SECTIONS
+from workbench.motion.trajectory import is_bag, load_trajectory
 from workbench.robot import BUS_IDS, JOINTS, RobotModel, bus_ids
 from workbench.robot.servo_units import units_of
 
@@ -29,7 +30,8 @@ SECTION, CYCLES = "section", "# cycles:"
 
 
 def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
-    """Reads a pose table (CSV, degrees), or a page of a ROBOTIS motion file as `FILE.mtn#page`.
+    """Reads a pose table (CSV, degrees), a page of a ROBOTIS motion file as `FILE.mtn#page`, or a joint trajectory in a bag of
+    ROS.
 
     Columns are found by the header's names; without a header they are `time` and the model's joints in alphabetical
     order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of every joint or of none, are moving speeds that replace
@@ -41,7 +43,12 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
         motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS,
-                                            model.mountings if model else None)
+                                       model.mountings if model else None)
+    elif is_bag(file):
+        motion = load_trajectory(file, page)
+        strange = [joint for joint in motion.joints if model is not None and joint not in model.joints]
+        if strange and model is not None:
+            raise InputError(path, f"the robot has no joint '{strange[0]}'; its joints: {' '.join(model.joints)}")
     else:
         motion = _parse(path, plain_text(path), model)
     return motion if model is None else replace(motion, units=units_of(model, motion.joints))

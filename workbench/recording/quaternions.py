@@ -1,6 +1,6 @@
 """Quaternions wxyz in bulk, (..., 4); the few operations this package needs, without a Python loop.
 
-Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; what has no gaps is left to scipy.
+Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; operations on rows without gaps use scipy.
 """
 
 from __future__ import annotations

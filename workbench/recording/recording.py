@@ -1,4 +1,4 @@
-"""What a file holds, untouched."""
+"""The raw content of a recording."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Sensing = Literal["mocap", "encoders"]
 
 @dataclass(frozen=True)
 class Recording:
-    """Raw content of a recording, in SI and radians but otherwise as it stands in the file.
+    """Raw content of a recording, in SI and radians but otherwise as in the file.
 
-    kind: name of its format. sensing: what saw the robot. version: of the format, as the file says. rate: [Hz], NaN if irregular.
+    kind: name of its format. sensing: the sensors. version: of the format, as in the file. rate: [Hz], NaN if irregular.
     frames: (N,) frame numbers. time: (N,) [s] from the first frame. rigid_bodies: asset -> path in the capture's axes
     (Motive: x forward up to a yaw, y up, z right). markers: name -> (N, 3) [m]. channels: joint channel
     ("goal.J", "speed.J" of moving, "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J",
-    "enabled.J") -> (N,). metadata: what the header said. problems: one line each. notes: how it was logged, as found in
+    "enabled.J") -> (N,). metadata: of the header. problems: one line each. notes: how it was logged, as found in
     it, one line each. nameless: the file does not name its one joint.
     aliases: names that the model may have for the joints, by those of the file.
     """
@@ -56,17 +56,17 @@ class Recording:
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a robot was looked at; a simulated take passes through the same.
+    """How a robot was observed; a simulated take passes through the same.
 
     starts_at: time of the first command on the recording's clock [s]. yaw: of the model's first heading in the capture's
     axes, about up, positive to the left [rad]. origin: the base link's origin at rest in the capture's axes turned into
     the model's (z up) [m]. pivots: asset -> p_LP_L (3,) [m], the asset's pivot in its link's frame. rest: asset -> (p, quat wxyz)
     in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
     rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the
-    base's tilt there; a recorded zero is this pose. joint_starts: what each joint alone says of the start [s].
+    base's tilt there; a recorded zero is this pose. joint_starts: start estimated from each joint alone [s].
     pivot_residual: asset -> RMS [m] by which its positions miss the kinematic tree. frames: asset -> rotation vector (3,) [rad],
-    in its own frame (the capture's axes, at rest), by which that is turned from where it is said to be; about its pivot, which
-    stays. The rest are standard deviations.
+    in its own frame (the capture's axes, at rest), of the error of its stated orientation; about its pivot, which is unchanged.
+    The rest are standard deviations.
     """
 
     starts_at: float

@@ -20,8 +20,8 @@ class Take:
 
     source: "recording", "simulation" or "playback". time: (N,) [s], from the first frame (a recording), or from the first command
     (a simulation, negative while it rests). starts_at: time of the first command [s]; NaN where unknown. base: "free", "fixed" or
-    "path". commands: what was sent to the servos, time zero at the first command. problems: what was repaired, marked or left
-    out, a line each. mended: (N,) frames whose gaps were filled.
+    "path". commands: commands sent to the servos, time zero at the first one. problems: repaired, marked or omitted
+    parts, a line each. mended: (N,) frames whose gaps were filled.
 
     joints: names of the n joints that were seen. q: (N, n) [rad]; NaN where unseen. zeroed: q is zero at the rest before the
     first command, as motion capture sees it; else q is the angle itself. q_sigma: (N, n) standard deviation of q [rad]. v: (N, n)
@@ -29,7 +29,7 @@ class Take:
     servo's, as a rotation vector in the base's axes in the neutral pose (forward, left, up).
 
     p_WB (N, 3) [m], quat_WB (N, 4) wxyz: pose of the base link's frame B in W. bodies: path of each rigid body that cameras
-    track, by the name of its Motive asset (`RobotModel.rigid_bodies` says on which link it is), in W. contact: force of the
+    track, by the name of its Motive asset (`RobotModel.rigid_bodies` gives its link), in W. contact: force of the
     ground on each foot (N, 3) [N] in W, by foot, which has the name of the last joint that moves it (the knee;
     `RobotModel.foot_links`).
 

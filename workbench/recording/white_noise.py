@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def white_noise(values: NDArray[np.float64]) -> float:
-    """Standard deviation of what is new with each of values (N,), evenly spaced, NaN where unseen: white noise e has third
+    """Standard deviation of the white noise in values (N,), evenly spaced, NaN where unseen: white noise e has third
     differences of variance 20 e^2, a motion hardly any. NaN where no four neighbours were seen."""
     with np.errstate(invalid="ignore"):
         third = np.abs(np.diff(values, n=3))

@@ -33,10 +33,10 @@ def load_profile(path: str | PurePath) -> ServoProfile:
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
                   "unlock", "watchdog", "marker", "maker", "group_read", *TOLERANCES)
-    position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
-    registers = _registers(_needed(top, "registers"))
+    position, speed, load = (_required_section(top, key) for key in ("position", "speed", "load"))
+    registers = _registers(_required_section(top, "registers"))
     profile = ServoProfile(
-        name=str(top.required("name", top.text("name"))), models=_names(_needed(top, "models")),
+        name=str(top.required("name", top.text("name"))), models=_names(_required_section(top, "models")),
         protocol=top.required("protocol", top.whole("protocol", least=1)),
         supply=_range(top, "supply"), position_mode=_position_mode(top.mapping("position_mode"), registers),
         counts=position.required("counts", position.whole("counts", least=2)),
@@ -44,11 +44,11 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         speed_unit=math.radians(_number(speed, "unit")), largest_speed=speed.required("largest", speed.whole("largest", least=1)),
         table_unit=None if (of_tables := speed.number("table_unit", least=0)) is None else math.radians(of_tables),
         load_unit=_number(load, "unit"), full_torque=top.required("full_torque", top.whole("full_torque", least=1)),
-        bit_rates=_bit_rates(_needed(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
+        bit_rates=_bit_rates(_required_section(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
         eeprom_below=top.required("eeprom_below", top.whole("eeprom_below")), registers=registers,
-        law=_law(_needed(top, "law"), registers), nominal=_nominal(_needed(top, "nominal")),
+        law=_law(_required_section(top, "law"), registers), nominal=_nominal(_required_section(top, "nominal")),
         tolerances={key: v for key in TOLERANCES if (v := top.number(key, least=0)) is not None},
-        alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
+        alarms=_names(_required_section(top, "alarms")), refusals=_names(_required_section(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
         marker=_marker(top, registers), maker=top.text("maker") or "",
         group_read=_group_read(top), source=str(path))
@@ -120,7 +120,7 @@ def _plain(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
 
 
-def _needed(f: Fields, key: str) -> Fields:
+def _required_section(f: Fields, key: str) -> Fields:
     found = f.mapping(key)
     if found is None:
         raise f.error(key, "is missing")

@@ -104,7 +104,7 @@ class ServoBank(LeafSystem):
         reference, share = context.get_discrete_state(0).CopyToVector(), abs(seconds) / self._period
         if self._lags:
             lagging = context.get_discrete_state(self._filtered).CopyToVector()
-            slow, passed = self.law.lag > 0, self._passed(abs(seconds))
+            slow, passed = self.law.lag > 0, self._filtered_share(abs(seconds))
             goal = np.where(slow, lagging + passed * (goal - lagging) if seconds > 0 else lagging, goal)
         step = np.minimum(np.maximum(goal - reference, down * share), up * share)
         moves = True if on is None else on
@@ -114,7 +114,7 @@ class ServoBank(LeafSystem):
             back = np.where(slow, (lagging - passed * sent) / left, sent)
             context.SetDiscreteState(self._filtered, goal if seconds > 0 else back)
 
-    def _passed(self, seconds: float) -> Array:
+    def _filtered_share(self, seconds: float) -> Array:
         """Share of a step of the goal (n,) that is behind the filter after so long."""
         with np.errstate(divide="ignore"):
             return -np.expm1(-seconds / self.law.lag)
@@ -135,7 +135,7 @@ class ServoBank(LeafSystem):
         reference = context.get_discrete_state(0).value()
         if self._lags:
             lagging = context.get_discrete_state(self._filtered).value()
-            goal = lagging + self._passed(self._period) * (goal - lagging)
+            goal = lagging + self._filtered_share(self._period) * (goal - lagging)
             values.set_value(self._filtered, goal)
         new = reference + np.minimum(np.maximum(goal - reference, down), up)
         if on is not None:  # the ramp starts at the measured position once torque is back

@@ -12,6 +12,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.recording.take import Take
+from workbench.simulation.cluster import on_cluster
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Simulation
 
@@ -21,7 +22,7 @@ KEPT_STATIONS = 3
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
-    """Takes of all jobs, in their order, the same whatever `n_jobs` is. Worker processes keep their last stations, so that
+    """Takes of the jobs, in their order, the same whatever `n_jobs` is. Worker processes keep their last stations, so that
     jobs that differ in commands alone build none. Inside `joblib.parallel_config(backend="dask")` the jobs run on the
     client's cluster. progress: called with (done, all).
     """
@@ -34,14 +35,12 @@ def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int
 
 
 def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
-    """The same takes one by one, each as soon as it and those before it are there; the others go on meanwhile.
+    """The same takes one by one, each as soon as it and those before it are done, while the others continue.
 
-    What the compiled station covers runs in threads of this process, the rest in processes."""
+    Jobs that the compiled station covers run in threads of this process, the rest in processes."""
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
-    from joblib.parallel import get_active_backend
-
-    if get_active_backend()[0].__class__.__name__ != "LokyBackend":  # somebody's cluster
+    if on_cluster():
         return _in_processes(jobs, n_jobs)
     return _in_threads_and_processes(jobs, n_jobs)
 

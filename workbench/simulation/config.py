@@ -26,11 +26,11 @@ class SimulationConfig:
     drive: "servo" (the full law), "fast_servo"
     (Drake's implicit PD; see fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
-    hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
-    written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces, in whole steps; 0: none.
+    hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of the logged
+    samples; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces, in whole steps; 0: none.
     boxes [m]: tallest of a field of random boxes on the floor, 0: none (`simulation.boxes`); boxes_seed: which field.
-    engine: of jobs and batches: "compiled" (Drake's discrete step compiled; `simulation.compiled` says what it covers), "drake",
-    or "auto", the compiled one for what it covers. A `Simulation` is always Drake's.
+    engine: of jobs and batches: "compiled" (Drake's discrete step compiled; see `simulation.compiled` for its coverage), "drake",
+    or "auto", the compiled one where it applies. A `Simulation` is always Drake's.
     """
 
     time_step: float = 1e-3

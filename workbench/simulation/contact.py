@@ -31,7 +31,7 @@ POINT_FOOT, HYDRO_FOOT = "foot_sphere", "foot_hydro"
 """Names by which a model's feet offer a shape for each contact model; a model with one shape only uses it for both."""
 GROUND_SIZE = (40.0, 40.0, 1.0)
 RIGID_STIFFNESS = 1e12
-"""Stiffness [N/m] that stands for a rigid ground beside feet of 1e4 to 1e6."""
+"""Stiffness [N/m] that represents a rigid ground for feet of 1e4 to 1e6."""
 
 
 def model_geometries(plant: MultibodyPlant, instance: ModelInstanceIndex) -> dict[GeometryId, str]:

@@ -1,4 +1,4 @@
-"""What is to be simulated: one run as plain data."""
+"""One simulation run as plain data."""
 
 from __future__ import annotations
 

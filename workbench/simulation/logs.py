@@ -1,4 +1,4 @@
-"""What a run wrote down, as plain arrays."""
+"""The logs of a run, as plain arrays."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ LEAD = 0.3
 
 def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int | None = None,
                duration: float | None = None, lead: float = LEAD) -> Job:
-    """A motion played `cycles` times (None: as often as it says itself), or for `duration` [s] of that, after `lead` [s] of rest.
+    """A motion played `cycles` times (None: as often as its file says), or for `duration` [s] of that, after `lead` [s] of rest.
 
     A servo gets the firmware's commands, rounded as there. An ideal joint follows the angles themselves, by a smooth cubic, as
     in the thesis's inverse dynamics.

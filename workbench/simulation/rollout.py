@@ -60,8 +60,8 @@ class Start(NamedTuple):
 
 
 def first_reference(commands: Commands, servos: Array, zero: Array) -> Array:
-    """Where ramps (n,) [rad] are as the first command comes to servos that stand at `servos` [rad]: at a goal without a moving
-    speed, which may have been sent long before; else where the servo stands, as the ramp sets out from there."""
+    """Ramps (n,) [rad] when the first command reaches servos at `servos` [rad]: at a goal without a moving speed, which may have
+    been sent long before; else at the servo's angle, from which the ramp starts."""
     return np.asarray(np.where(commands.speeds[0] > 0, servos, commands.goals[0] + zero))
 
 
@@ -132,7 +132,7 @@ class Simulation:
         if base_path is not None:
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
         if start is not None:
-            self._put(Start(*start), commands)
+            self._set_start(Start(*start), commands)
         self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
         setter = None if steadied is None else BaseSetter(
@@ -150,7 +150,7 @@ class Simulation:
 
     def _take(self, name: str, lead: float, sent: Commands | None, commands: Commands | None, sampled: Array,
               forces: dict[str, Array], setter: BaseSetter | None = None) -> Take:
-        """What the logs hold. lead: when the first command came [s]; sent: what the take says of commands, `commands` what
+        """A take from the logs. lead: time of the first command [s]; sent: commands recorded in the take, `commands` those that
         reached the servos."""
         t, state = self._logs.read("state")
         time = t - lead
@@ -165,7 +165,7 @@ class Simulation:
         return self._as_built(take, state)
 
     def play_back(self, take: Take) -> Take:
-        """The thesis's animation: the model posed at each frame of a take, without dynamics; what the take did not see stays in
+        """The thesis's animation: the model posed at each frame of a take, without dynamics; unseen joints stay in
         neutral, gaps are bridged. Returns a Take on the same clock."""
         return play_back(self.diagram, self.context, self.model, self.config.base, take)
 
@@ -173,7 +173,7 @@ class Simulation:
         """For SteppedRun: puts the robot where its run starts; returns what `_is_stepping` knows it by."""
         self._rest_in_neutral(None)
         if start is not None:
-            self._put(start, None)
+            self._set_start(start, None)
         self._set_first_command(0.0)
         self.simulator.Initialize()
         return self._runs
@@ -197,7 +197,7 @@ class Simulation:
         return Start(q - self._zero, v, logged=True, base=base, reference=reference)
 
     def _as_built(self, take: Take, state: Array) -> Take:
-        """The take with what the links do, where they do not follow the servos as the model says."""
+        """The take with the motion of the links, where they do not follow the servos rigidly."""
         if self._zero.any():
             take = replace(take, servo_q=take.q - self._zero)
         if self._structure is None:
@@ -278,7 +278,7 @@ class Simulation:
         bank = self.diagram.GetSubsystemByName("servo_bank")
         return bank, self.diagram.GetMutableSubsystemContext(bank, self.context)
 
-    def _put(self, start: Start, commands: Commands | None) -> None:
+    def _set_start(self, start: Start, commands: Commands | None) -> None:
         """Starts from a given state, with the ramp of each servo where it says, or at its first goal."""
         if self.config.base == "free" and start.base is None:
             raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path', or the pose "

@@ -1,7 +1,7 @@
-"""A walk that is put back, every so often, to where the real robot was.
+"""A walk whose base is reset to the real robot's at intervals.
 
-Walking is chaotic over seconds, not over half a second: a foot that just slips sends the whole rest of a walk elsewhere. So the
-base gets the recorded pose and velocity at given instants, and the joints, which their servos hold, go on as they are
+Walking is chaotic over seconds, not over half a second: a foot that just slips changes the whole rest of a walk. So the
+base gets the recorded pose and velocity at given instants, and the joints, which their servos hold, are left unchanged
 (multiple shooting; H. G. Bock, Springer Ser. Chem. Phys. 18, 1981).
 """
 
@@ -47,11 +47,11 @@ class JointStates:
 
 
 class BaseSetter:
-    """Puts a free base where it was recorded. Make it while the robot rests before the first command.
+    """Resets a free base to the recorded one. Make it while the robot rests before the first command.
 
-    Heading becomes the recorded one; tilt and velocities do the more, the farther the robot has tilted from the recorded one. The
-    path goes on where it is, as the floor is the same everywhere. Where feet stand cameras do not see to a contact's
-    penetration, so that height is what leaves the lowest point of the robot's shapes as deep as it was."""
+    Heading becomes the recorded one; tilt and velocities do in proportion to the tilt error of the robot. The path continues from
+    its position, as the floor is the same everywhere. Cameras do not resolve a contact's penetration, so the height is chosen
+    such that the lowest point of the robot's shapes is as deep as before."""
 
     def __init__(self, states: BaseStates, plant: MultibodyPlant, scene_graph: SceneGraph, base: RigidBody, plant_context: Context
                  ) -> None:
@@ -84,8 +84,8 @@ class BaseSetter:
         self._plant.SetFreeBodySpatialVelocity(context=self._context, body=self._base, V_JpJc=velocity)
 
     def in_one_piece(self, time: Array, p_WB: Array, quat_WB: Array) -> tuple[Array, Array]:
-        """A path (N, 3), (N, 4) at run times (N,) with the jumps of heading taken out of it again: what the robot gains is told
-        from where it stands, and may be gained across one."""
+        """A path (N, 3), (N, 4) at run times (N,) with the jumps of heading removed: the gain of the robot is measured from its
+        position, and may extend across a jump."""
         p, R = np.array(p_WB), Rotation.from_quat(np.array(quat_WB), scalar_first=True)
         for at, where, turn in reversed(self._turned):
             later = time > at + 1e-9

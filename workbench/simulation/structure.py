@@ -23,7 +23,7 @@ class Joints:
 
 
 class Structure:
-    """Play, springs and lengths beside the model's kinematics. `joints`: all that turn, servos' and those put between."""
+    """Play, springs and lengths added to the model's kinematics. `joints`: all that turn, servos' and those put between."""
 
     def __init__(self, model: RobotModel, physics: Physics) -> None:
         assert physics.description is not None
@@ -73,7 +73,7 @@ class Structure:
         return Joints(angle, rate, off)
 
     def servo_angles(self, link_angles: Array, q: Array) -> Array:
-        """Where servos (n,) [rad] have to stand for links at `link_angles` (n,), the stages as they are in q (joints,)."""
+        """Angles of servos (n,) [rad] for links at `link_angles` (n,), with the other joints as in q (joints,)."""
         at = np.array(q, dtype=float)
         at[[self.joints.index(j) for j in self._model.joints]] = 0.0
         return np.asarray(link_angles - self.seen(at[None], np.zeros((1, len(at)))).q[0])

@@ -14,7 +14,7 @@ from workbench.robot.model import RobotModel
 from workbench.types import Array
 
 STAND_CLEARANCE = 0.05
-"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; how high it hung says nothing."""
+"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; its real height does not matter."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def since_start(take: Take) -> Array:
 
 
 def names_of(simulated: Take, recorded: Take | None) -> tuple[str, str]:
-    """What a legend calls the two takes: simulated and measured, or, of two simulations, by their own names."""
+    """Names of the two takes in a legend: simulated and measured, or, for two simulations, their own names."""
     if recorded is None or recorded.source != "simulation":
         return "simulated", "measured"
     a, b = simulated.name, recorded.name
@@ -71,7 +71,7 @@ def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback]
         links = _seen_from(links, model.base)
     p, R = _base(take, time, clock)
     if p is None or R is None:
-        p, R = _standing(time, like[1] if like else None)
+        p, R = _rest_pose(time, like[1] if like else None)
     elif like is not None:
         p, R = _laid_over(p, R, like[1], take.zeroed)
     played = Playback(time, q, p, R, links)
@@ -91,7 +91,7 @@ def _joints(take: Take, model: RobotModel, time: Array, clock: Array, like: tupl
         if joint in take.joints:
             measured = take.q[:, take.column(joint)]
             if np.isfinite(measured).any():
-                q[:, i] = _held(time, clock, measured[:, None])[:, 0] + rest[i]
+                q[:, i] = _interpolate(time, clock, measured[:, None])[:, 0] + rest[i]
     return q
 
 
@@ -100,11 +100,11 @@ def _base(take: Take, time: Array, clock: Array) -> tuple[Array | None, Array | 
         return None, None
     if not (np.isfinite(take.p_WB).all(axis=1).any() and np.isfinite(take.quat_WB).all(axis=1).any()):
         return None, None
-    quat = _held(time, clock, take.quat_WB)
-    return _held(time, clock, take.p_WB), Rotation.from_quat(quat, scalar_first=True).as_matrix()
+    quat = _interpolate(time, clock, take.quat_WB)
+    return _interpolate(time, clock, take.p_WB), Rotation.from_quat(quat, scalar_first=True).as_matrix()
 
 
-def _held(time: Array, clock: Array, values: Array) -> Array:
+def _interpolate(time: Array, clock: Array, values: Array) -> Array:
     """Columns of `values` (N, k) at `time`: linear between neighbours, the last one seen in gaps, the nearest outside."""
     good = np.isfinite(values).all(axis=1)
     seen = np.flatnonzero(good)
@@ -118,7 +118,7 @@ def _held(time: Array, clock: Array, values: Array) -> Array:
     return np.asarray(a + (b - a) * share[:, None], dtype=float)
 
 
-def _standing(time: Array, other: Playback | None) -> tuple[Array, Array]:
+def _rest_pose(time: Array, other: Playback | None) -> tuple[Array, Array]:
     """A base that nobody followed: where the other take's stood at first, else level."""
     p, R = (other.base_p[0], other.base_R[0]) if other is not None else (np.zeros(3), np.eye(3))
     return np.tile(p, (len(time), 1)), np.tile(R, (len(time), 1, 1))
@@ -135,8 +135,8 @@ def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
 
 
 def _laid_over(p: Array, R: Array, other: Playback, zeroed: bool) -> tuple[Array, Array]:
-    """Turned about the vertical and moved so that both stand in the same place at rest. The attitude of a zeroed take is
-    a rotation away from how it stood, so it is given the other's tilt at rest."""
+    """Rotated about the vertical and moved so that both coincide at rest. The attitude of a zeroed take is relative to its rest
+    pose, so it is given the other's tilt at rest."""
     resting = other.time < 0 if (other.time < 0).any() else np.arange(len(other.time)) == 0
     R_rest, R_other = (Rotation.from_matrix(X[resting]).mean().as_matrix() for X in (R, other.base_R))
     turn = R_other @ R_rest.T

@@ -1,4 +1,4 @@
-"""What a robot looks like: the visual shapes of its links, and where its feet touch."""
+"""Appearance of a robot: the visual shapes of its links, and the contact points of its feet."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MeshPart:
 @dataclass(frozen=True)
 class VisualShape:
     """A shape on a link: its pose in the link's frame and its colour. `mesh`: name of its mesh in `RobotShapes.meshes`, or
-    None for a shape that meshcat draws by itself."""
+    None for a shape that meshcat draws without a mesh."""
 
     shape: Any
     X_LG: RigidTransform

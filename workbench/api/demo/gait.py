@@ -37,7 +37,7 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
     request = Request(speed=SPEED)
     result = optimize(GaitMachine(model), request, load_ensemble(), demo_options(),
                       lambda what, done: progress(f"a new gait: {what}", done), None, other_engine())
-    parts: list[Part] = [Text(_said(result))]
+    parts: list[Part] = [Text(_describe(result))]
     if result.table is not None and result.certified is not None:
         write_gait(folder, result.table, result.certified)
         progress("a new gait: drawing its page", None)
@@ -49,7 +49,7 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
     return Section("A new gait", parts)
 
 
-def _said(result: Optimized) -> str:
+def _describe(result: Optimized) -> str:
     if not result.met:
         return result.problem
     assert result.certified is not None

@@ -18,8 +18,8 @@ TRIES, WAIT = 3, 500.0
 
 
 def enter_bridge(port: Any) -> None:
-    """Makes the CM-530 behind a port an adapter. BusError in one line where nothing that speaks its frames is there, or where it
-    refuses, with what it is doing instead."""
+    """Makes the CM-530 behind a port an adapter. BusError in one line where no device there understands its frames, or where it
+    refuses, with its current activity."""
     doing = ""
     try:
         for _ in range(TRIES):
@@ -39,7 +39,7 @@ def enter_bridge(port: Any) -> None:
 
 
 def leave_bridge(port: Any) -> None:
-    """Tells it that this was all; where it does not hear, it finds out by itself within a second."""
+    """Ends the bridge; if the message is lost, the controller notices within a second."""
     with suppress(*GONE):
         port.writePort(list(frame(FrameType.BRIDGE_END)))
 
@@ -58,7 +58,7 @@ def _answer(port: Any) -> tuple[AnswerMessage | None, StateMessage | None]:
 
 
 def _drain(port: Any) -> None:
-    """What it was still saying of its log and its state is no answer of a servo."""
+    """Remaining bytes of its log and its state are no answer of a servo."""
     end = port.getCurrentTime() + 60
     while port.getCurrentTime() < end:
         port.readPort(256)

@@ -24,8 +24,8 @@ LONGEST = 200
 
 @dataclass(frozen=True)
 class BusOptions:
-    """tries: how often a servo is asked before it is said to be silent; at 1 % of answers lost, three leave one in a million.
-    settle: what a servo needs after a byte of EEPROM was written [s] (AX-12: 6 ms a byte, in which it is deaf)."""
+    """tries: how often a servo is asked before it counts as silent; at 1 % of answers lost, three leave one in a million.
+    settle: pause after a byte of EEPROM was written [s] (AX-12: 6 ms a byte, in which it is deaf)."""
 
     tries: int = 3
     settle: float = 0.01
@@ -35,10 +35,10 @@ class Bus:
     """Servos on one port, of one family.
 
     port: dynamixel-sdk's, with `pause` and `patience` (`SerialPort`, or a virtual one). joints: by ID, for messages.
-    alarms: what each servo's last answer said of its state. retries: by ID, how often it had to be asked again.
-    strip_echo: for an adapter that is known to hear itself; any other that does is refused. latency: how long answers take
-    beyond their bytes [s], once it was measured. asked: when the last byte of the last question was out [s], as the servo answers
-    what it feels then.
+    alarms: state in each servo's last answer. retries: by ID, how often it had to be asked again.
+    strip_echo: for an adapter that is known to hear itself; any other that does is refused. latency: delay of answers
+    beyond their bytes [s], once it was measured. asked: when the last byte of the last question was out [s], since the servo
+    answers with its state at that time.
     """
 
     def __init__(self, port: Any, profile: ServoProfile, joints: Mapping[int, str] | None = None,
@@ -88,12 +88,12 @@ class Bus:
             answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
             return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
 
-        data = self._asked(servo, names[0] if len(names) == 1 else None, call, count)
+        data = self._ask(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
 
     def write(self, servo: int, values: Mapping[str, int], check: bool = True) -> None:
-        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written. A servo
-        that answers reads only (status_return_level 1) is believed by what it reads.
+        """Writes registers one by one and, with `check`, reads each back. BusError names the first mismatch. A servo
+        that answers reads only (status_return_level 1) is judged by its readings.
 
         EEPROM of a family that locks it is unlocked before and locked after."""
         eeprom = any(self._register(name).address < self.profile.eeprom_below for name in values)
@@ -125,10 +125,10 @@ class Bus:
             self.options = kept
 
     def reboot(self, servo: int) -> None:
-        """Has a servo start anew, where its protocol can; clears a latched alarm."""
+        """Restarts a servo, where its protocol can; clears a latched alarm."""
         if self.profile.protocol != 2:
-            raise BusError("cannot be started anew over the bus; switch its power off and on", servo, self.joints.get(servo))
-        self._asked(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
+            raise BusError("cannot be restarted over the bus; switch its power off and on", servo, self.joints.get(servo))
+        self._ask(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
 
     # All
 
@@ -183,7 +183,7 @@ class Bus:
         return sent
 
     def release(self, servos: Iterable[int]) -> None:
-        """Torque off, of all at once and twice, as nobody answers; never raises for a servo, only where the port is gone."""
+        """Torque off, broadcast twice, as nobody answers; never raises for a servo, only where the port is gone."""
         off = {servo: {"torque_enable": 0} for servo in servos}
         if off:
             self.sync_write(off)
@@ -230,11 +230,11 @@ class Bus:
         def call() -> tuple[bytes, int, int]:
             return b"", *self._handler.writeTxRx(self.port, servo, register.address, register.size, data)
 
-        self._asked(servo, name, call, 0)
+        self._ask(servo, name, call, 0)
         if register.address < self.profile.eeprom_below:
             self.pause(self.options.settle * register.size)
 
-    def _asked(self, servo: int, register: str | None, call: Callable[[], tuple[bytes, int, int]], count: int) -> bytes:
+    def _ask(self, servo: int, register: str | None, call: Callable[[], tuple[bytes, int, int]], count: int) -> bytes:
         """An answer, asked for again and again; its error byte is the servo's alarms, or a refusal."""
         joint, result = self.joints.get(servo), COMM_SUCCESS
         for attempt in range(self.options.tries):
@@ -250,7 +250,7 @@ class Bus:
         raise NoAnswerError(f"{how} in {self.options.tries} tries", servo, joint, register)
 
     def _look(self, servo: int, error: int) -> str:
-        """Takes note of the alarms in an error byte; what the instruction was refused for, or ""."""
+        """Records the alarms in an error byte; returns the reason why the instruction was refused, or ""."""
         profile = self.profile
         if profile.protocol == 1:
             self.alarms[servo] = tuple(name for bit, name in profile.alarms.items() if error >> bit & 1)

@@ -1,4 +1,4 @@
-"""What goes wrong on a bus, in one line that names servo, joint and register."""
+"""Errors on a bus, in one line that names servo, joint and register."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
 
 
 class StripEcho:
-    """A port behind an adapter that hears itself: what comes back of each packet is taken off, and compared."""
+    """A port behind an adapter that hears itself: the echo of each packet is removed, and compared."""
 
     def __init__(self, port: Any) -> None:
         self.__dict__["port"] = port

@@ -20,7 +20,7 @@ from workbench.robot.servo_registers import ServoReading, ServoRegisters
 STATE = ("present_position", "present_voltage", "present_temperature")
 ALL_IDS = range(253)
 FIRST = 25.0
-"""Patience with a servo before any has answered [ms]: what an FTDI chip as it comes keeps answers for, and half as much."""
+"""Time-out for a servo before any has answered [ms]: the default latency of an FTDI chip, and half as much again."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Survey:
     latency: float = 0.0
 
     def problems(self) -> tuple[str, ...]:
-        """What has to be fixed before anything moves, a line each."""
+        """Problems that have to be fixed before anything moves, a line each."""
         out = [f"joint {joint} does not answer" for joint in self.missing]
         out += [f"servo {i}: two servos seem to have this ID, or its cable is bad" for i in self.doubled]
         out += self._supply()
@@ -123,7 +123,7 @@ def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
             progress("reading registers", k / len(numbers))
         if servo not in doubled:
             joint = joints.get(servo)
-            found[servo] = _found(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
+            found[servo] = _describe_servo(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
     return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
 
@@ -154,7 +154,7 @@ def read_registers(bus: Bus, servo: int) -> dict[str, int]:
     return out | bus.read(servo, *group)
 
 
-def _found(bus: Bus, servo: int, number: int, joint: str | None, mounting: Mounting) -> FoundServo:
+def _describe_servo(bus: Bus, servo: int, number: int, joint: str | None, mounting: Mounting) -> FoundServo:
     name = model_name(number, bus.profile.protocol)
     if number not in bus.profile.models:  # its table is another one
         return FoundServo(servo, joint, number, name, {}, math.nan, math.nan, 0, ())

@@ -16,7 +16,7 @@ NOBODY = 0xFC
 SLOWEST = 50.0
 """How long an adapter may keep an answer [ms], beyond its bytes; FTDI chips keep it for 16 on Linux unless told otherwise."""
 LEAST = 3.0
-"""Patience with the fastest adapter [ms]: what a computer that does other things besides takes now and then."""
+"""Time-out with the fastest adapter [ms]: occasional delay of a computer that does other things as well."""
 QUESTIONS = 10
 
 
@@ -30,7 +30,7 @@ def ping(protocol: int, servo: int) -> bytes:
 
 
 def hear(port: Any, data: bytes, most: int, patience: float) -> bytes:
-    """What comes back within the time of `most` bytes and `patience` [ms] after a packet, whatever it is."""
+    """Everything received within the time of `most` bytes and `patience` [ms] after a packet."""
     port.clearPort()
     port.writePort(list(data))
     deadline = port.getCurrentTime() + (len(data) + most) * port.tx_time_per_byte + patience
@@ -85,7 +85,7 @@ def slow_adapter(latency: float) -> str:
     """What to do about answers that come late by so much [s]; "" where it is no worth a word."""
     if latency < SLOW_ANSWERS:
         return ""
-    return (f"answers come {1000 * latency:.0f} ms late: the adapter keeps them. On Linux an FTDI chip is told not to by "
+    return (f"answers come {1000 * latency:.0f} ms late: the adapter holds them. On Linux, set the latency of an FTDI chip by "
             "`echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer`")
 
 
@@ -95,5 +95,5 @@ SLOW_ANSWERS = 2e-3
 
 def echo_error() -> BusError:
     """Of an adapter that hears itself."""
-    return BusError("the adapter hears what it sends itself, so that every ID seems to answer; use one that does not "
-                    "(U2D2, USB2Dynamixel), or say --echo")
+    return BusError("the adapter echoes its own transmissions, so that every ID seems to answer; use one that does not "
+                    "(U2D2, USB2Dynamixel), or add --echo")

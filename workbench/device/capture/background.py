@@ -1,4 +1,4 @@
-"""A recording that runs beside the motion that it sees."""
+"""A recording that runs during the motion that it sees."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.device.capture.take import record_take
 from workbench.files import InputError
 
 PATIENCE = 10.0
-"""Until the first frame has to be there [s]: three times what the recorder itself waits for it."""
+"""Time until the first frame must have arrived [s]: three times the recorder's own time-out for it."""
 
 
 class BackgroundRecording:

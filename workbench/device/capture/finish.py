@@ -1,4 +1,4 @@
-"""From the journal to the take: a Motive CSV that every reader of takes reads, and what the network did to it."""
+"""From the journal to the take: a Motive CSV that every reader of takes reads, and the losses on the network."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ from workbench.types import Array
 KEPT = 20
 """Broken packets whose bytes are kept, for whoever wants to know why."""
 DRIFT_AFTER = 10.0
-"""Seconds of echoes from which the clock's drift is told: 0.1 ms over them are 10 ppm, less than what two crystals differ by."""
+"""Seconds of echoes from which the clock's drift is estimated: 0.1 ms over them are 10 ppm, less than the difference of two
+crystals."""
 SAME = 50e-6
 """Drift over a whole take [s] below which the nominal rate is taken for the measured one."""
 
@@ -71,9 +72,9 @@ class Capture:
 
 def finish(journal: str | Path, take: str | Path, ended: str = "", motive_recording: str | None = None,
            until: float | None = None) -> Capture:
-    """Writes the take (CSV) and beside it NAME.capture.json, whole or not at all; frames that did not come, and bodies that were
-    not seen, are blank cells. ended: why it ended early. until: host time [s] after which frames are left out. InputError
-    where the journal holds no frame."""
+    """Writes the take (CSV) and NAME.capture.json in the same folder, complete or not at all; frames that did not come, and
+    bodies that were not seen, are blank cells. ended: why it ended early. until: host time [s] after which frames are left out.
+    InputError where the journal holds no frame."""
     journal, take = Path(journal), Path(take)
     content = _Content(journal)
     ledger, frames = content.ledger, content.frames
@@ -89,7 +90,7 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
     if until is not None:
         frames = {n: f for n, f in frames.items() if first_host + (f.time - first) <= until}
         if len(frames) < 2:
-            raise InputError(journal, "no two frames before the end of what was to be seen")
+            raise InputError(journal, "fewer than two frames before the recording's end")
     bodies = _tracks(frames, content.names, counts.first, max(frames))
     gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
     problems = _problems(counts, gaps, worst, clock, content, ended)
@@ -103,7 +104,7 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
 
 
 class _Content:
-    """What a journal holds."""
+    """Content of a journal."""
 
     def __init__(self, path: Path) -> None:
         self.ledger, self.frames, self.clocks = Ledger(), {}, []  # type: tuple[Ledger, dict[int, Frame], list[dict[str, float]]]
@@ -147,7 +148,7 @@ class _Content:
 
 
 def _rate(numbers: NDArray[np.int64], times: Array) -> tuple[float, float]:
-    """Rate of the frames on the server's clock [Hz], and by how much a frame's time misses number/rate at most [s]."""
+    """Rate of the frames on the server's clock [Hz], and the largest deviation of a frame's time from number/rate [s]."""
     n, t = numbers - numbers[0], times - times[0]
     slope = float(np.polyfit(n, t, 1)[0])
     if not slope > 0:

@@ -1,4 +1,4 @@
-"""Which frames came, and how: what was lost, late, doubled or broken, counted exactly."""
+"""Exact counts of the frames that were lost, late, doubled or broken."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Ledger:
     _last: int = -1
 
     def frame(self, number: int) -> Literal["new", "late", "doubled", "far"]:
-        """A whole frame; `far`, and not counted, where its number is of another stream: Motive was started anew or plays back."""
+        """A whole frame; `far`, and not counted, where its number is of another stream: Motive was restarted or plays back."""
         if self._seen and not self.near(number):
             return "far"
         if number in self._seen:

@@ -32,7 +32,7 @@ class Link(Protocol):
         """A packet to the server's command port."""
 
     def subscribe(self, info: ServerInfo) -> None:
-        """Opens what the frames come on, once the server has said what that is."""
+        """Opens the socket for the frames, once the server has named it."""
 
     def receive(self, timeout: float) -> tuple[float, bytes] | None:
         """The next packet and when it came; None after `timeout` [s]."""

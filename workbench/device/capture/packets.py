@@ -1,4 +1,4 @@
-"""NatNet packets, versions 2.7 to 4.x: what a Motive server says of itself, of its assets and of each frame.
+"""NatNet packets, versions 2.7 to 4.x: descriptions of a Motive server, its assets and each frame.
 
 The layout of frames and asset descriptions is that of the PyPI package natnet. Lengths, end and time stamps are read here: its
 decoder knows neither the software latency of 2.x nor the precision time stamp of 4.1 and later.
@@ -49,8 +49,8 @@ class BrokenPacketError(ValueError):
 
 @dataclass(frozen=True)
 class ServerInfo:
-    """What the server says of itself. version: of the bit stream. clock_frequency: ticks/s of its time stamps (NaN before 3.0).
-    group: multicast address, None where it sends to each client alone; before 3.0, where it does not say, the usual one."""
+    """Description of a server. version: of the bit stream. clock_frequency: ticks/s of its time stamps (NaN before
+    3.0). group: multicast address, None where it sends to each client alone; before 3.0, where it is not given, the usual one."""
 
     application: str
     application_version: str

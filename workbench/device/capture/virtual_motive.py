@@ -48,7 +48,7 @@ class Sent:
 class VirtualMotive:
     """A server without sockets: `answer` takes a client's packet, `due` gives the frames up to a time.
 
-    scene: what the cameras see. started: time of its first mid-exposure on the caller's clock [s]. clock: its own clock at that
+    scene: the bodies in view. started: time of its first mid-exposure on the caller's clock [s]. clock: its own clock at that
     moment [s], which runs `clock_ratio` times as fast. group: multicast, or None. precision: whether frames from 4.1 on carry the
     precision time stamp.
     """
@@ -76,7 +76,7 @@ class VirtualMotive:
         return self.clock(self.started + (number - self.first_number) / self.rate)
 
     def answer(self, data: bytes, now: float) -> list[bytes]:
-        """What it answers to a packet at a time [s] of the caller's clock."""
+        """Its answer to a packet at a time [s] of the caller's clock."""
         kind, size = struct.unpack_from("<HH", data)
         payload = data[4:4 + size]
         if kind == Message.CONNECT:
@@ -116,13 +116,13 @@ class VirtualMotive:
             data = data[:self._random.randrange(8, len(data))]
         elif draw < f.lost + f.broken + f.doubled:
             sent.doubled.add(number)
-            self._put(at + 0.3 / self.rate, data)
+            self._schedule(at + 0.3 / self.rate, data)
         elif draw < f.lost + f.broken + f.doubled + f.swapped:
             sent.swapped.add(number)
             at += 1.5 / self.rate
-        self._put(at, data)
+        self._schedule(at, data)
 
-    def _put(self, at: float, data: bytes) -> None:
+    def _schedule(self, at: float, data: bytes) -> None:
         self._order += 1
         heapq.heappush(self._queue, (at, self._order, data))
 

@@ -1,1 +1,1 @@
-"""The CM-530 over its serial line: its program, boot loader, PC link, and motions that it plays by itself."""
+"""The CM-530 over its serial line: its program, boot loader, PC link, and motions that it plays without the computer."""

@@ -15,8 +15,8 @@ FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that b
 PROMPT_WAIT, ANSWER_WAIT, START_WAIT = 20.0, 5.0, 2.0
 """How long the user has to switch on, the loader to answer, and the program to speak [s]."""
 DEAF, QUIET, PROMPT_AGAIN = 3.0, 0.2, 2.0
-"""Silence after which the port is opened anew while the key is held; silence after which the loader has said all; how long it has
-to answer an empty line [s]. A USB adapter may keep bytes for 16 ms."""
+"""Silence after which the port is reopened while the key is held; silence after which the loader has finished; its time to
+answer an empty line [s]. A USB adapter may hold bytes for 16 ms."""
 CHUNK = 256
 
 
@@ -32,7 +32,7 @@ class Line(Protocol):
         ...
 
     def read(self, seconds: float) -> bytes:
-        """What comes within this time; b"" for silence."""
+        """Bytes received within this time; b"" for silence."""
         ...
 
 
@@ -57,7 +57,7 @@ RESTART = "switch the controller off and on; if it stays dark, run this again"
 
 @dataclass
 class Transcript:
-    """All that went over the line, with times [s since the beginning]; `text` is what is kept in a file."""
+    """The whole conversation, with times [s since the beginning]; `text` is the version for a file."""
 
     lines: list[str] = field(default_factory=list)
     now: Callable[[], float] = clock.monotonic
@@ -85,7 +85,7 @@ class Loading:
         self._state = UNTOUCHED
 
     def run(self, image: bytes) -> StateMessage:
-        """Returns what the new program says of itself."""
+        """Returns the new program's first message."""
         try:
             self._find_prompt()
             self._load()
@@ -117,12 +117,12 @@ class Loading:
             heard = (heard + new)[-4096:]
         heard += self._fresh_prompt()
         if not any(name in heard for name in profile.identity):
-            raise LoadError(f"the loader says {_shown(heard)}, which is no {profile.name} ({profile.source} knows "
+            raise LoadError(f"the loader says {_excerpt(heard)}, which is no {profile.name} ({profile.source} knows "
                             f"{_listed(profile.identity)})", self._state, "check which controller this is")
 
     def _fresh_prompt(self) -> bytes:
-        """Has it forget what is left in its line, as keys that came after it had begun to listen: lines are ended until one is
-        answered by nothing but a prompt. All that it said."""
+        """Clears its input line of keys typed after it began to listen: lines are ended until one is answered only by a prompt.
+        Returns its whole output."""
         heard = self._until_quiet()
         for _ in range(5):
             self._write(self._profile.line_end)
@@ -151,7 +151,7 @@ class Loading:
                 return
             self._state = UNTOUCHED
             if last:
-                raise LoadError(f"the loader said {_shown(heard)} after LOAD", self._state, AGAIN)
+                raise LoadError(f"the loader said {_excerpt(heard)} after LOAD", self._state, AGAIN)
             self._fresh_prompt()
 
     def _send(self, image: bytes) -> None:
@@ -162,12 +162,12 @@ class Loading:
             self._line.write(data[at:at + CHUNK])
 
     def _expect(self, texts: tuple[bytes, ...], seconds: float, when: str, refused: tuple[bytes, ...] = ()) -> bytes:
-        """What it says until one of these texts, or of `refused`; LoadError at a failure, or at nothing of all that."""
+        """Its output up to one of these texts, or of `refused`; LoadError at a failure, or if none of them comes."""
         heard, waited = b"", 0.0
         while not any(text in heard for text in (*texts, *refused)):
             failed = [text for text in self._profile.failure if text in heard]
             if failed and not any(text.startswith(f) for f in failed for text in refused):
-                raise LoadError(f"the loader said {_shown(heard)} {when}", self._state, AGAIN)
+                raise LoadError(f"the loader said {_excerpt(heard)} {when}", self._state, AGAIN)
             if waited >= seconds:
                 self._nothing_known(heard, when)
             new = self._read(0.1)
@@ -178,11 +178,11 @@ class Loading:
     def _nothing_known(self, heard: bytes, when: str) -> None:
         if not heard:
             raise LoadError(f"the loader was silent {when}", self._state, f"check cable, port and power; {AGAIN}")
-        raise LoadError(f"the loader said {_shown(heard)} {when}, which {self._profile.source} does not hold", self._state,
+        raise LoadError(f"the loader said {_excerpt(heard)} {when}, which {self._profile.source} does not hold", self._state,
                         f"if that is right, add it there; {AGAIN}")
 
     def _start(self) -> StateMessage:
-        """The program is what starts after the next reset, too; then it is started, and says so itself."""
+        """Makes the program start after every reset; then starts it, and waits for its own message."""
         profile = self._profile
         self._progress("4 of 4: starting it", None)
         self._until_quiet()
@@ -216,7 +216,7 @@ class Loading:
         self._line.reopen()
 
     def _until_quiet(self) -> bytes:
-        """What it says until it has been silent for a while."""
+        """Its output until it has been silent for a while."""
         heard = new = self._collect(QUIET)
         while new:
             new = self._collect(QUIET)
@@ -250,7 +250,7 @@ class Loading:
         return data
 
 
-def _shown(heard: bytes) -> str:
+def _excerpt(heard: bytes) -> str:
     text = heard[-60:].decode("ascii", "replace").strip()
     return repr(text)
 

@@ -1,4 +1,4 @@
-"""What a controller's loader says and takes (data/loaders), and whether an image is a program for it."""
+"""Texts and commands of a controller's loader (data/loaders), and whether an image is a program for it."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ COMPILER = "arm-none-eabi-gcc"
 
 @dataclass(frozen=True)
 class Program:
-    """What is to be loaded: the image, the table in it, and what `check_limits` had to say."""
+    """A program to load: the image, the table in it, and the results of `check_limits`."""
 
     image: bytes
     table: TableFile
@@ -34,9 +34,9 @@ CYCLES = 10
 
 def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: bool,
              endless: bool = False) -> tuple[TableFile, tuple[Violation, ...]]:
-    """The table of a motion (CSV or .mtn), or a binary table as it is; InputError where a limit is broken, unless `force`.
+    """The table of a motion (CSV or .mtn), or a binary table unchanged; InputError where a limit is broken, unless `force`.
 
-    cycles: stops after so many; None: as many as the motion says, else CYCLES. endless: goes on until it is stopped.
+    cycles: stops after so many; None: as many as in the motion, else CYCLES. endless: repeats until it is stopped.
     """
     if Path(motion).suffix == ".table":
         return read_table_file(motion), ()
@@ -50,7 +50,7 @@ def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: b
 
 def build_program(motion: str | Path, model: RobotModel, profile: LoaderProfile, folder: Path, cycles: int | None = None,
                   force: bool = False, endless: bool = False) -> Program:
-    """Conversion, compilation and a look at the result; all in `folder`. InputError names what is in the way."""
+    """Conversion, compilation and a check of the result; all in `folder`. InputError names the obstacle."""
     table, violations = table_of(motion, model, cycles, force, endless)
     data = encode_table(table)
     long = too_long(len(table.joints), len(table.table))

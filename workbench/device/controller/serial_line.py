@@ -24,7 +24,7 @@ class SerialLine:
         self._guard(lambda: self._port.write(data))
 
     def read(self, seconds: float) -> bytes:
-        """What comes within this time, or as soon as something has come."""
+        """Bytes received within this time, returned as soon as there are any."""
         until = time.monotonic() + seconds
         while True:
             data: bytes = self._guard(lambda: self._port.read(4096))

@@ -1,4 +1,4 @@
-"""What was sent and read while a motion played, appended line by line, so that it survives whatever ends the program."""
+"""Journal of commands and readings while a motion plays, appended line by line, so that it survives any end of the program."""
 
 from __future__ import annotations
 

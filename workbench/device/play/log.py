@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.device.play.journal import read_play_journal
 from workbench.files import InputError
 from workbench.recording.formats.joint_log import write_joint_log
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 NEAR = 0.002
 """A row holds what was read within so long of it [s], moved to the row's time along the line between two readings: at 200 deg/s
@@ -110,7 +109,7 @@ def _trusted(readings: Mapping[str, Array]) -> dict[str, Array]:
     return out
 
 
-def _possible(rows: Array) -> NDArray[np.bool_]:
+def _possible(rows: Array) -> Mask:
     """Without single readings to and from which the joint would have had to turn faster than any servo: answers to another
     program's question, or bytes whose errors the checksum missed."""
     step, took = np.diff(rows[:, 1]), np.maximum(np.diff(rows[:, 0]), 1e-4)

@@ -41,7 +41,8 @@ class Played:
     on the bus's clock [s]. worst_late: by which a pose was late [s]. stopped: why it ended early, "" where it did not. released:
     whether torque is off. unknown: joints that did not say so when they were asked. rates: readings of each joint in the motion,
     a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time, and poses
-    sent only when the next one was due. log_problem: why there is no joint log, "" where there is one."""
+    sent only when the next one was due. log_problem: why there is no joint log, "" where there is one. log_start: time zero of
+    the log, on the bus's clock [s]; NaN where nobody knows."""
 
     journal: Path
     started: float
@@ -55,3 +56,4 @@ class Played:
     repaired: int = 0
     missed: int = 0
     log_problem: str = ""
+    log_start: float = math.nan

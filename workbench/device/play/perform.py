@@ -1,4 +1,4 @@
-"""A whole playing: journal, motion, joint log; whatever ends it, the log of what was done is kept."""
+"""A complete run: journal, motion, joint log; however it ends, the log so far is kept."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def preflight(found: Survey) -> None:
 
 def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callable[[], str], options: PlayOptions | None = None,
             watching: WatchOptions | None = None, progress: Callable[[str, float | None], None] | None = None) -> Played:
-    """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds what was done; it
-    goes when the log is on the disk. BusError, or InputError, where it could not be played to an end that is in order; where it
-    was stopped before there was anything to log, `log_problem` says so."""
+    """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds the journal, which
+    is deleted when the log is on the disk. BusError, or InputError, where it could not be played to a regular end; where it
+    was stopped before there was anything to log, `log_problem` gives the reason."""
     preflight(found)
     reading_plan(bus, len(found.found), commands, watching)
     joints = [servo.joint for servo in found.found.values() if servo.joint is not None]

@@ -15,7 +15,7 @@ from workbench.files import InputError
 from workbench.motion.commands import Commands
 
 STEP = 0.02
-"""Readings of a joint farther apart than this leave out what a walk does [s]: a quarter of the shortest pose there is."""
+"""Readings of a joint farther apart than this miss parts of a walk [s]: a quarter of the shortest pose there is."""
 STATE_BYTES = 9
 """Of registers in one reading, on average over those with and without load, voltage and heat."""
 ENOUGH = 500

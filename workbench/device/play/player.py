@@ -53,6 +53,7 @@ class _Performance:
         self.read: Counter[str] = Counter()
         self.overtaken, self.missed_before = 0, 0
         self._energised = False
+        self._rested = math.nan
 
     def run(self, commands: Commands) -> Played:
         rig, bus = self.rig, self.rig.bus
@@ -86,7 +87,7 @@ class _Performance:
         finally:
             bus.options = kept
         return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown,
-                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before)
+                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before, log_start=self._rested)
 
     def _rates(self) -> dict[str, float]:
         """Readings of each joint in the motion, a second."""
@@ -180,7 +181,9 @@ class _Performance:
 
     def _rest(self) -> None:
         self.progress("resting in neutral", None)
-        self.rig.journal.write(t=self.rig.bus.now(), rest=True)
+        now = self.rig.bus.now()
+        self._rested = now if math.isnan(self._rested) else self._rested
+        self.rig.journal.write(t=now, rest=True)
         self._read_until(self.rig.bus.now() + self.options.rest)
 
     def _poses(self, commands: Commands) -> None:

@@ -27,15 +27,16 @@ STATE_EVERY = 6
 SPAN = 32
 """Bytes that are worth reading in one packet rather than asking twice."""
 MARGIN = 1.3
-"""Of what a reading is thought to cost, that has to be left before a pose, so that the pose is not late."""
+"""Share of a reading's estimated cost that must remain before a pose, so that the pose is not late."""
 DECAY = 0.8
-"""Of what a reading is thought to cost, with each pose that left no time for one: so one hiccup is soon forgotten."""
+"""Decay of a reading's estimated cost with each pose that left no time for one: so one hiccup is soon forgotten."""
 DEAREST = 0.04
-"""What one reading may be thought to cost at most [s]: what took longer was no reading, but a computer that stood still."""
+"""Largest estimated cost of a reading [s]: a longer one was no reading, but a computer that stalled."""
 RELEASE = 1.0
 """How long torque off is said again to servos that do not confirm it [s]."""
 LIMP_EVERY = 5
-"""Torque enable, and what a restart forgets, are read with every fifth reading of a servo: they lie far from the rest."""
+"""Torque enable, and the marker that a restart clears, are read with every fifth reading of a servo: their addresses are far
+off."""
 
 
 @dataclass
@@ -132,12 +133,12 @@ class Rig:
             self.journal.write(t=self.bus.now(), torque={joint: on})
 
     def limit_torque(self, share: float) -> None:
-        """Torque limits of all joints at a share of what was found."""
+        """Torque limits of every joint at a share of the values found."""
         self.bus.sync_write({self.ids[j]: {"torque_limit": round(share * found)} for j, found in self.torque_limits.items()})
 
     def release(self, seconds: float = RELEASE) -> tuple[str, ...]:
-        """Torque off, of all at once, and read back; said again for so long [s] to those that do not answer. Returns the joints
-        of which nobody knows."""
+        """Torque off, broadcast and read back; repeated for so long [s] for servos that do not answer. Returns the joints
+        whose state is unknown."""
         bus, waiting, end = self.bus, dict(self.ids), self.bus.now() + seconds
         while True:
             bus.release(self.ids.values())
@@ -156,7 +157,7 @@ class Rig:
         return tuple(waiting)
 
     def mark(self, on: bool) -> None:
-        """Sets, or clears, what a restart forgets."""
+        """Sets, or clears, the marker that a restart clears."""
         marker = self.bus.profile.marker
         if marker:
             self.bus.sync_write({servo: {marker: int(on)} for servo in self.ids.values()})
@@ -189,7 +190,7 @@ class Rig:
             self._costs[names] = max(min(bus.now() - before, DEAREST), 0.9 * cost)
 
     def _names(self, at_once: bool, turns: int) -> tuple[str, ...]:
-        """What is read next."""
+        """The next reading."""
         if at_once:
             turn = self._turn % (4 * STATE_EVERY)
             return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
@@ -238,7 +239,7 @@ class Rig:
         self._take(joint, values, asked, took)
 
     def _take(self, joint: str, values: Mapping[str, int], time: float, took: float = 0.0) -> None:
-        """Judges what was read, and writes it down; time: when the servo felt it [s]. took: until the answer was there [s]."""
+        """Judges a reading, and logs it; time: when the servo measured it [s]. took: until the answer was there [s]."""
         bus, servo = self.bus, self.ids[joint]
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
         if "present_position" not in values:

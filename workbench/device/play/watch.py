@@ -43,10 +43,10 @@ class WatchOptions:
 
 
 TRIPPED = 255
-"""What the register of a bus watchdog holds once it has stopped the servo, which then refuses goals."""
+"""Value of a bus watchdog's register once it has stopped the servo, which then refuses goals."""
 HELD_UP = "could not be read for {:.1f} s, as the computer or the adapter was held up"
 SUDDEN = ("electrical shock", "current")
-"""Alarms of a servo that burns what it gets: torque goes at once."""
+"""Alarms of a servo that is being damaged: torque off at once."""
 
 
 class Watch:

@@ -93,7 +93,7 @@ class Answers:
             self.reversed.append(other)
 
     def findings(self, ids: Mapping[str, int]) -> list[str]:
-        """What is wrong with bus IDs and directions, a line each."""
+        """Errors of bus IDs and directions, a line each."""
         out = [f"servo {ids[told]} is {seen}, not {told}: bus_ids should say {seen}: {ids[told]}"
                for told, seen in self.moved.items() if told != seen]
         seen = list(self.moved.values())
@@ -102,8 +102,8 @@ class Answers:
         return out
 
     def corrected(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
-        """The keys `bus_ids` and `direction` of a `robot` section that agree with what was seen; a key that is right already is
-        left out. InputError where two servos were seen to move one joint."""
+        """The keys `bus_ids` and `direction` of a `robot` section that agree with the observations; a key that is right already
+        is left out. InputError where two servos were seen to move one joint."""
         seen = list(self.moved.values())
         if len(set(seen)) < len(seen):
             raise InputError(None, "one joint moved for several servos; wiggle them again")

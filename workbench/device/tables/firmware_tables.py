@@ -1,4 +1,4 @@
-"""Firmware tables: what the controller's program plays, as the thesis's text files and as a C header."""
+"""Firmware tables: the motion for the controller's program, as the thesis's text files and as a C header."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the tab
 
 @dataclass(frozen=True)
 class Export:
-    """What `export` wrote, what it had to say about it, and why motion.table is not among the files ("" where it is)."""
+    """Files written by `export`, its warnings, and why motion.table is not among the files ("" where it is)."""
 
     files: tuple[Path, ...]
     violations: tuple[Violation, ...]
@@ -46,7 +46,7 @@ def export(
     """Checks a motion against the servos' limits and writes its firmware tables.
 
     simulated: the motion as it ran in simulation; without it torque goes unchecked. InputError, and nothing written,
-    where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
+    where a limit is broken, unless `force`; warnings never stop it. Values that the registers cannot hold are always refused.
     motion.table is for the CM-530's program, and left out where that cannot play it (other servos, or too many poses).
     """
     check_servos(motion, model)
@@ -82,11 +82,11 @@ def write_tables(
 ) -> list[Path]:
     """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where `file` holds it with its bounds, motion.table; all or none.
 
-    The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
-    line that says the order of joints, the same in all files; where servos are none of the AX-12A's family, a second line says
-    which they are, as counts are theirs; where there are poses of a start or a stop, a line says how many (SECTIONS), and where
-    a servo turns against its joint or has its zero elsewhere, a line says so (MOUNTED). Goals are those of the servos. InputError
-    for a joint without a bus ID.
+    The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first line with
+    the order of joints, the same in all files; where servos are not of the AX-12A's family, a second line names the families,
+    whose counts are used; where there are poses of a start or a stop, a line gives their number (SECTIONS), and where a servo
+    turns against its joint or has its zero elsewhere, a line lists it (MOUNTED). Goals are those of the servos. InputError for a
+    joint without a bus ID.
     """
     _check_ids(table.joints, ids, table.source)
     mounted = [(j, m.direction, zero) for j, u, zero in zip(table.joints, table.units, zeros(table, mountings or {}))
@@ -139,7 +139,7 @@ Order = tuple[tuple[str, ...], tuple[ServoUnits, ...], tuple[int, int], Mapping[
 
 
 def _read(path: Path, width: int | None = None) -> tuple[Order, Counts]:
-    """What the first lines say, and a row of `width` counts (default: one for each joint) for each pose."""
+    """Content of the first lines, and a row of `width` counts (default: one for each joint) for each pose."""
     lines = [line.strip() for line in read_text(path).splitlines() if line.strip()]
     if not lines or not lines[0].startswith(ORDER):
         raise InputError(path, f"line 1: expected '{ORDER} …', the order of joints")

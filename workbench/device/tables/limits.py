@@ -1,4 +1,4 @@
-"""Whether the servos can do what a pose table requires."""
+"""Whether a pose table is within the servos' limits."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Violation:
 
 
 def check_limits(table: PoseTable, model: RobotModel, simulated: Take | None = None) -> list[Violation]:
-    """What the table requires beyond the joints' ranges, the servos' speed and, as it ran in simulation, their torque.
+    """Requirements beyond the joints' ranges, the servos' speed and, as it ran in simulation, their torque.
 
     Broken limits come first, then warnings. The registers' own range is the table's to refuse. InputError for a joint
     that the model or the take lacks.
@@ -99,7 +99,7 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
         for k in np.flatnonzero(asked[:, i] > reached):
             broken = bool(asked[k, i] > no_load)
             limit = no_load if broken else reached
-            what = "its no-load speed" if broken else "what the servo reaches unloaded against its own friction"
+            what = "its no-load speed" if broken else "the speed that the unloaded servo reaches against its own friction"
             text = (f"moving speed {table.speeds[k, i]} is {asked[k, i]:.1f} rpm, beyond {what}, "
                     f"{limit:.1f} rpm at {servo.supply_voltage:g} V")
             yield Violation("speed", joint, float(asked[k, i]), limit, "rpm", text, pose=int(k) + 1, warning=not broken)

@@ -1,4 +1,4 @@
-"""The binary table: what the controller plays, compiled into its program or sent to it (layout in docs/robot.md)."""
+"""The binary table for the controller, compiled into its program or sent to it (layout in docs/robot.md)."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ _JOINT = struct.Struct("<BBHHHHH")
 
 @dataclass(frozen=True)
 class JointBounds:
-    """What the controller holds a joint to: bus ID, model number of its servo, goals from `low` to `high`, moving speed up to
-    `fastest`, and where neutral is [all in the servo's own counts]. direction: -1 where the servo turns against its joint; the
+    """Limits that the controller enforces for a joint: bus ID, model number of its servo, goals from `low` to `high`, moving
+    speed up to `fastest`, and neutral [all in the servo's own counts]. direction: -1 where the servo turns against its joint; the
     controller has no use for it, and a binary table does not hold it."""
 
     bus_id: int
@@ -54,8 +54,8 @@ class JointBounds:
 
 @dataclass(frozen=True)
 class TableFile:
-    """A pose table, in the servos' own counts, with what makes it safe to play. joints: as many as the table's columns. cycles:
-    how many, where `stops`; else the table goes on until it is stopped or another comes."""
+    """A pose table, in the servos' own counts, with its safety limits. joints: as many as the table's columns. cycles:
+    how many, where `stops`; else the table repeats until it is stopped or another comes."""
 
     table: PoseTable
     joints: tuple[JointBounds, ...]
@@ -165,7 +165,7 @@ def encode_table(file: TableFile) -> bytes:
 
 
 def decode_table(data: bytes, names: Mapping[int, str] | None = None, source: str = "table") -> TableFile:
-    """The table in these bytes; InputError says what is wrong with them, exactly where the controller's program refuses them.
+    """The table in these bytes; InputError describes the error, exactly where the controller's program refuses them.
 
     names: joint by bus ID (default: the puppy's; others are called `id7`).
     """

@@ -11,7 +11,7 @@ from workbench.device.virtual.clock import SECOND
 
 @dataclass(frozen=True)
 class Drive:
-    """What a servo does to its joint: enabled, goal angle [rad], speed [rad/s] (0: at once), share of full torque (0 to 1), and
+    """Command of a servo to its joint: enabled, goal angle [rad], speed [rad/s] (0: at once), share of full torque (0 to 1), and
     the law's margin and slope [counts] and punch [of 1023], None where the family has none."""
 
     enabled: bool = False
@@ -25,7 +25,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Sense:
-    """What a servo feels of its joint: angle [rad], velocity [rad/s] and its own output, -1 to 1."""
+    """State of a joint as felt by its servo: angle [rad], velocity [rad/s] and the servo's own output, -1 to 1."""
 
     angle: float
     velocity: float = 0.0

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from workbench.device.virtual.servo import VirtualServo
 
 Line = Callable[[int], int]
-"""What a stretch of cable makes of a byte."""
+"""Effect of a stretch of cable on a byte."""
 
 
 class Talker(Protocol):
@@ -58,8 +58,8 @@ def byte_ticks(rate: int) -> int:
 class ServoBus:
     """The wire with its servos; controllers and adapters talk by `talk` and listen by `join`.
 
-    to_servos, from_servos: what the cable makes of bytes on their way (`bit_flips`). All servos share one decoder for each bit
-    rate, as they all hear the same.
+    to_servos, from_servos: effect of the cable on bytes in each direction (`bit_flips`). All servos share one decoder for each
+    bit rate, as they all hear the same.
     """
 
     def __init__(self, clock: Clock, to_servos: Line | None = None, from_servos: Line | None = None) -> None:
@@ -103,7 +103,7 @@ class ServoBus:
         return ends[-1]
 
     def silence(self, talker: object) -> None:
-        """What this talker has not sent yet stays unsent, as when its power goes."""
+        """Bytes that this talker has not sent yet are dropped, as when its power fails."""
         self.settle()
         self._flying = [b for b in self._flying if b.talker is not talker]
 
@@ -200,4 +200,4 @@ class ServoBus:
 
 
 PACKET_PAUSE = SECOND // 10
-"""A packet that stops for longer is forgotten by a servo [ticks]. Not documented; any value above a few ms fits what is known."""
+"""A packet that stops for longer is discarded by a servo [ticks]. Not documented; any value above a few ms is consistent."""

@@ -1,7 +1,7 @@
-"""An emulated loader at the other end of a line, in virtual time: what a controller is after each thing that can go wrong.
+"""An emulated loader at the other end of a line, in virtual time: the state of a controller after each possible fault.
 
-Its texts are those of data/loaders, so it is a witness of the conversation's order and of every cut, not of the texts themselves.
-Like a console it keeps every character that is typed, echoes it, and refuses what it does not know.
+Its texts are those of data/loaders, so it tests the conversation's order and every interruption, not the texts themselves.
+Like a console it keeps every character that is typed, echoes it, and refuses unknown commands.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from workbench.device.controller.loader_profile import LoaderProfile
 from workbench.device.link import FrameType, frame
 
 SETTLE = 0.5
-"""Silence after which the loader takes what has come for the whole image [s]. The real one's rule is not known."""
+"""Silence after which the loader takes the received bytes for the whole image [s]. The real one's rule is not known."""
 
 
 POWERED_ON = frame(FrameType.STATE, bytes([0, 0, 0, 0, 2, 1, 255, 1, 0, 0, 111, 0]))
@@ -29,7 +29,7 @@ class Controller:
 
     @property
     def runs(self) -> str:
-        """What it would start: "factory", "new", or "nothing"."""
+        """The program that would start: "factory", "new", or "nothing"."""
         if not self.whole:
             return "nothing"
         return "factory" if self.program == b"factory" else "new"
@@ -43,8 +43,8 @@ class EmulatedLoader:
     """A line to a controller that is being switched on with the key held.
 
     cut_after: bytes over the line, both ways together, after which it is gone. says: replaces a text of the profile, by name.
-    mute: never says anything. starts: what the program says when it is started (default: our STATE frame). late: how long each
-    text takes to come [s], as over a USB adapter. deaf: hears nothing until the port has been closed and opened again. drops: how
+    mute: never sends anything. starts: the program's message when it is started (default: our STATE frame). late: delay of each
+    text [s], as over a USB adapter. deaf: hears nothing until the port has been closed and reopened. drops: how
     often the first character of LOAD is lost.
     """
 
@@ -90,7 +90,7 @@ class EmulatedLoader:
         self.time += len(data) * 10 / self._profile.rate
 
     def read(self, seconds: float) -> bytes:
-        """What comes within this time."""
+        """Bytes received within this time."""
         self.time += seconds
         self._settle()
         out = b"".join(text for due, text in self._out if due <= self.time)

@@ -19,8 +19,8 @@ CHUNK = 62
 class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     """An adapter such as the U2D2 on a virtual bus; `echo` hears itself, as adapters without direction control do.
 
-    unplugged: as if pulled out: what the operating system then raises is raised. latency: how long bytes are kept at most, as an
-    FTDI chip does where they are fewer than 62 [s]; jitter: by how much less it may be [s].
+    unplugged: as if pulled out: raises the operating system's error. latency: longest time that bytes are held, as by an
+    FTDI chip where they are fewer than 62 [s]; jitter: largest reduction of it [s].
     """
 
     def __init__(self, bus: ServoBus, rate: int = 1_000_000, echo: bool = False) -> None:
@@ -87,7 +87,7 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         self._rx.clear()
 
     def writePort(self, packet: Sequence[int]) -> int:
-        """Sends now, or when what was written before is out."""
+        """Sends now, or after everything written before."""
         self._alive()
         start = max(self.bus.clock.now, self._sending_until)
         self._sending_until = self.bus.talk(self, bytes(packet), self.baudrate, start)
@@ -96,7 +96,7 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
-        """What is there; where nothing is, virtual time goes on to the next event, at most a millisecond."""
+        """Bytes received so far; if there are none, virtual time advances to the next event, at most a millisecond."""
         self._alive()
         if not self._rx:
             clock = self.bus.clock

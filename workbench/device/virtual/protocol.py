@@ -22,7 +22,7 @@ class Instruction:
 
 
 class Protocol(TypingProtocol):
-    """What a chain of servos needs to know of its packets."""
+    """Packet format, as needed by a chain of servos."""
 
     def decoder(self) -> Callable[[int], Instruction | None]:
         """A new decoder: takes one byte, gives the packet that ends with it."""
@@ -33,7 +33,7 @@ class Protocol(TypingProtocol):
         ...
 
     def identity(self, model: int, firmware: int) -> bytes:
-        """What a ping is answered with."""
+        """The answer to a ping."""
         ...
 
 
@@ -67,7 +67,7 @@ class Protocol1:
         return packet(servo, error, parameters)
 
     def identity(self, model: int, firmware: int) -> bytes:
-        """What a ping is answered with: nothing but that it is there."""
+        """The answer to a ping, which contains nothing else."""
         return b""
 
 

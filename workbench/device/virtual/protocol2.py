@@ -47,7 +47,7 @@ class Protocol2:
         return packet(servo, STATUS, bytes([number | (ALERT if error & _STATE else 0)]) + parameters)
 
     def identity(self, model: int, firmware: int) -> bytes:
-        """What a ping is answered with."""
+        """The answer to a ping."""
         return model.to_bytes(2, "little") + bytes([firmware])
 
 

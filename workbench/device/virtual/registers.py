@@ -1,5 +1,5 @@
-"""What kind of servo it is: where its registers lie, by the same data file that real ones are read by, and what a servo does with
-them."""
+"""Kinds of servos: addresses of their registers, from the same data file by which real ones are read, and behaviour of each
+register."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Register:
 
 @dataclass(frozen=True)
 class Kept:
-    """What a servo keeps in a register: from the factory or at power-on, and what may be written (None: nothing). at: address and
-    size of one that the data file does not name, as nobody needs it from outside."""
+    """One register of a servo: value from the factory or at power-on, and values that may be written (None: none). at: address
+    and size if the data file does not name it, as nobody needs it from outside."""
 
     default: int = 0
     writable: tuple[int, int] | None = None
@@ -48,9 +48,9 @@ class VirtualProfile:
     bit_rate: value of the baud-rate register to bit/s. answer_times: of ping, read, and write with its time for each byte.
     interrupt: the motor interrupt's period and length, in which nothing is sent. refresh: how seldom speed and load are new.
     eeprom_time: for each byte written, in which the servo is deaf. speed_sign, load_sign: bit of the sign, 0 for two's
-    complement. full_torque: count of torque_limit that limits nothing. goal_enables: whether a goal switches torque on.
-    eeprom_lock: 1 where the register lock closes the EEPROM and can be opened again. boot: from power-on until it listens; what
-    ROBOTIS says of the XC-330 (0.4 s), and no measurement.
+    complement. full_torque: count of torque_limit that sets no limit. goal_enables: whether a goal switches torque on.
+    eeprom_lock: 1 where the register lock closes the EEPROM and can be opened again. boot: from power-on until it listens; stated
+    by ROBOTIS for the XC-330 (0.4 s), not measured.
     """
 
     name: str
@@ -87,7 +87,7 @@ class VirtualProfile:
 
 def emulated(file: str, model: str, size: int, kept: Mapping[str, Kept], **own: Any) -> VirtualProfile:
     """A servo of the family that a file in data/servos describes: addresses, sizes, signs, units and bit rates are the file's,
-    `own` what only a servo knows of itself."""
+    `own` holds the properties that only an emulation needs."""
     family = load_profile(data_file(f"servos/{file}.yaml"))
 
     def sign(name: str) -> int:

@@ -1,4 +1,4 @@
-"""A virtual servo: its whole control table, its times, its alarms. What it moves is the body's business."""
+"""A virtual servo: its whole control table, its times, its alarms. The moving joint is the body's business."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from workbench.device.virtual.registers import Register, VirtualProfile
 VOLTAGE, ANGLE, HEAT, RANGE, CHECKSUM, OVERLOAD, UNKNOWN = (1 << k for k in range(7))
 """Bits of the status packet's error byte."""
 TRIPPED = 255
-"""What a bus watchdog holds once it has stopped the servo."""
+"""Value of a bus watchdog's register once it has stopped the servo."""
 
 
 class VirtualServo:
     """One servo on a bus, by default an AX-12A as it leaves the factory, but for its ID.
 
-    joint: the body's name for what it moves (default: the ID it starts with). seed: phase of its motor interrupt and jitter.
+    joint: the body's name for its joint (default: the ID it starts with). seed: phase of its motor interrupt and jitter.
     Faults a test may set: mute (hears, never answers), temperature [deg C], overload (as if stalled for long), settings. It is
     made as one that has started; after its power was off it hears nothing for the family's `boot`, unless not `starts_slowly`.
     """
@@ -91,7 +91,7 @@ class VirtualServo:
     # Power
 
     def power(self, on: bool) -> None:
-        """Plug pulled or put back: RAM registers start anew, EEPROM stays."""
+        """Plug pulled or put back: RAM registers are reset, EEPROM stays."""
         self.bus.silence(self)
         self.powered = on
         if on:
@@ -156,8 +156,8 @@ class VirtualServo:
         self._answer(time, 0, bytes(self._table[address:address + count]), self.profile.answer_times[1], level=1)
 
     def answer_in_turn(self, what: bytes, time: int) -> int | None:
-        """One of many that were asked at once for `what`, address and count, when it is its turn. When its last byte is out, None
-        where it says nothing."""
+        """Its answer when many were asked at once for `what`, address and count, when it is its turn. When its last byte is out,
+        None where it is silent."""
         address, count = what
         if not self.powered or self.mute or time < self._deaf_until or address + count > self.profile.size:
             return None

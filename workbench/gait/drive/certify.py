@@ -155,7 +155,8 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
         digest = content.pop("sha256")
         good = content["format"] == 1 and digest == _digest(content)
         step = content["step_map"]
-        step_map = StepMap(**{f.name: tuple(step[f.name]) if f.name == "scatter" else step[f.name] for f in fields(StepMap)})
+        numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
+        step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
         found = FamilyCertificate(content["most"], content["most_change"], step_map, content["draws"], content["gait"],
                                   content["model_sha256"], tuple(content["problems"]))
     except (ValueError, KeyError, TypeError, AttributeError) as e:

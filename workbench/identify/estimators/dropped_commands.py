@@ -140,14 +140,14 @@ def stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: in
     e = evidence[i]
     assert e.take.commands is not None
     goal = float(e.take.commands.goals[k, e.take.commands.column(joint)])
-    seen = _seen(e, joint)
+    seen = _observed_angle(e, joint)
     stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
     way = 1.0 if goal > stood else -1.0
-    end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
+    end = max(float(np.nanquantile(way * _observed_angle(other, joint), 0.995)) for other in evidence if joint in other.joints)
     return way * goal > end and way * stood > end - READ_OFF.at_stop
 
 
-def _seen(e: TakeEvidence, joint: str) -> Array:
+def _observed_angle(e: TakeEvidence, joint: str) -> Array:
     """Where a joint was [rad], the zero being the servo's."""
     return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
@@ -165,7 +165,7 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
     commands = e.take.commands
     assert commands is not None
     column, i = commands.column(joint), e.channels.index(joint)
-    seen = _seen(e, joint)
+    seen = _observed_angle(e, joint)
     said = seen - residual[:, i] * e.sigma[i]
     at, missed, alike = 0.0, list[int](), True
     for k, goal in enumerate(commands.goals[:, column]):
@@ -188,5 +188,5 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
 
 def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
     """How many poses would have moved a joint, as it was seen to do or not."""
-    seen = np.isfinite(_seen(e, joint))
+    seen = np.isfinite(_observed_angle(e, joint))
     return sum(k in gone or bool((_at_the_end_of(e, k) & seen).any()) for k in {*steps(e, joint, gone), *gone})

@@ -50,7 +50,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
         if not new:
             break
         after = _played(evaluator, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
-        guilty = {(i, j): tuple(k for k in poses if _explained(evaluator.evidence[i], j, k, now[i], after[i]))
+        guilty = {(i, j): tuple(k for k in poses if _is_explained(evaluator.evidence[i], j, k, now[i], after[i]))
                   for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
         found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
@@ -104,7 +104,7 @@ def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) ->
     return bool(len(then)) and bool(np.all(np.abs(was) < READ_OFF.calm)) and bool(then.max() > max(READ_OFF.behind, -then.min()))
 
 
-def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
+def _is_explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
     """Whether a joint goes as recorded without a pose, until the next came."""
     came, until = _between(e, k)
     time, channel = e.take.recorded.since_start, e.channels.index(joint)

@@ -1,4 +1,4 @@
-"""What can refute an effect of the likeliest model, beside other models: each check says which, and why."""
+"""Checks that can refute an effect of the most probable model, compared with other models: each names it, and the reason."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def checks(pool: Sequence[Candidate], evidence: Sequence[TakeEvidence], options:
 
 
 def refuted(tried: Sequence[Check], rollouts: Rollouts, found: Sequence[Found]) -> list[Refuted]:
-    """What the first check says that refutes anything; empty where none does."""
+    """Result of the first check that refutes anything; empty where none does."""
     return next((said for said in (check(rollouts, found) for check in tried) if any(said)), [])
 
 

@@ -21,7 +21,7 @@ from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
-from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
+from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, with_fits, without_names
 from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
@@ -48,7 +48,7 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     felt = [c for c in problem.pool if c.where != (nominal.base,)]
     asked, by_registers = within_registers(felt, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
-    shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 else []
+    shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 and options.most else []
     most_work = math.inf if problem.thorough else options.most_work
     robot, rejected = _searched(Rollouts.of(evaluator, nominal, regions, most_work), shared, felt, options, progress)
     rollouts, found, rejected = robot.rollouts, robot.found, [*by_registers, *rejected]
@@ -62,10 +62,13 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = gone_on(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
-    progress("names that are tied", None)
-    names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
-    progress("an unnamed torque", None)
-    rollouts, found = _beside_unnamed(rollouts, found, options)
+    names: dict[int, list[Fitted]] = {}
+    if options.most:
+        progress("names that are tied", None)
+        names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+        found = tuple(with_fits(f, names[k], options) for k, f in enumerate(found))
+        progress("an unnamed torque", None)
+        rollouts, found = _beside_unnamed(standing(rollouts, found), found, options)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
@@ -81,7 +84,7 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
     return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
                        tuple(rejected), options, problem.played.missed, drifting, stopped,
-                       tuple(names[k] for k in range(len(found))))
+                       tuple(names.get(k, []) for k in range(len(found))))
 
 
 def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,

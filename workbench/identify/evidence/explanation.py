@@ -1,4 +1,4 @@
-"""What a search of servo logs by evidence found, with its probabilities, and what it says of it."""
+"""Result of a search of servo logs by evidence, with its probabilities, in words."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Explanation:
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
     def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:
-        """What a finding's sentence says of an unnamed torque in its place."""
+        """Clause of a finding's sentence about an unnamed torque as an alternative."""
         depends_on, probability = p.unnamed_instead((c.name, c.where))
         if probability < CONCLUSIONS.worth_an_experiment:
             return ""
@@ -139,7 +139,7 @@ class Explanation:
         return tuple(sorted(out, key=lambda u: -u.confidence))
 
     def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:
-        """What acts in all joints at once."""
+        """Effects that act on every joint at once."""
         out, at, sure = [], self.robot.together, CONCLUSIONS.surest * self.robot.sure
         nats = at.log_posterior
         for (c, x), s in zip(at.shared.sizes(), at.shared.slices()):
@@ -153,7 +153,7 @@ class Explanation:
         return out
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
-        """Of all numbers of the model's effects, in the units of docs/formats.md; a recalibrated zero is one of them. read_off:
+        """Joint posterior of the model's effects, in the units of docs/formats.md; a recalibrated zero is one of them. read_off:
         effects that no search identified."""
         model = self.model
         names = parameter_names(model.effects)
@@ -187,11 +187,11 @@ class Explanation:
         return self.rollouts.evaluator.evidence
 
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
-        """Whole takes: the search plays what it was given."""
+        """Whole takes: the search plays them unchanged."""
         return evaluator
 
     def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
-        """Residuals on whole takes in the limit of a step of zero, and what the last steps differ by, over sigma."""
+        """Residuals on whole takes in the limit of a step of zero, and the difference of the last steps, over sigma."""
         progress("rolling out the fitted model", None)
         evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
         steps = (2 * PROBLEM.fine, PROBLEM.fine)
@@ -200,7 +200,7 @@ class Explanation:
         return {i: extrapolated(longer[i], shorter[i]) for i in everywhere}, floors
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-        """What is beyond noise and numerics, with its worst event, and parameters that drift within a take."""
+        """Residuals beyond noise and numerical error, with their worst event, and parameters that drift within a take."""
         return (*left_over(evidence, after, floors), *(d.left(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
@@ -224,7 +224,7 @@ class Explanation:
         return tuple(out)
 
     def ties(self) -> tuple[Tie, ...]:
-        """The likeliest model beside the likeliest one in which another effect stands in a finding's place."""
+        """The most probable model, and the most probable one in which another effect replaces a finding."""
         out = []
         for k, p in enumerate(self.posteriors):
             for c in p.best.hypothesis.effects:

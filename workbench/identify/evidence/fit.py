@@ -82,7 +82,8 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
         density, precision = density + h.law.log_prior, np.concatenate([precision, h.law.precision])
         slopes, parts = np.hstack([J, beside]), parts + len(h.law.scales)
     log, s = region.likelihood.evidence(r, slopes, density, precision)
-    return Fitted(h, r, J, s, log, parts * log_odds(len(region.candidates), options.expected), beside=beside)
+    odds = parts * log_odds(len(region.candidates), options.expected) - sum(c.effect.rarity for c in h.effects)
+    return Fitted(h, r, J, s, log, odds, beside=beside)
 
 
 def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,

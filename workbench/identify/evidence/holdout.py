@@ -36,8 +36,8 @@ def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tup
 
 def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]
            ) -> Asks[dict[Candidate, float]]:
-    """The effects of a fit that unseen takes speak against, with by how much [nats]: log likelihood of takes kept back, of the
-    fit with them and without, each fitted to the other takes; summed over the folds that can tell."""
+    """The effects of a fit that held-out takes contradict, with the evidence against each [nats]: log likelihood of the held-out
+    takes, of the fit with the effect and without, each fitted to the other takes; summed over the folds that can decide."""
     effects = best.hypothesis.effects
     said = dict.fromkeys(range(len(effects)), 0.0)
     for fold in folds:
@@ -56,7 +56,7 @@ def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequen
 
 
 def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: float, J: Array) -> Asks[Fitted]:
-    """A fit to the takes that are seen; what it asks is rolled out on all of them."""
+    """A fit to the takes that are not held out; its requests are rolled out on all of them."""
     mine = region.of([p.take for p in seen.parts])
     part = fitting(seen, options, h, s, options.iterations, None, J[mine])  # type: ignore[arg-type]
     try:

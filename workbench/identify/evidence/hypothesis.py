@@ -1,5 +1,4 @@
-"""A hypothesis about one region: its numbers that may be recalibrated, the effects there, and what is believed before any
-data."""
+"""A hypothesis about one region: its servo constants that may be recalibrated, its effects, and their prior."""
 
 from __future__ import annotations
 
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 FAR = EvidenceOptions.far
-"""Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
+"""Limit of a recalibrated constant [standard deviations]: beyond it is a finding, named after the corresponding effect."""
 UNNAMED = "unknown torque"
-"""Stands for a torque law among the terms of a hypothesis."""
+"""Represents a torque law among the terms of a hypothesis."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -33,9 +32,9 @@ Label = tuple[str, tuple[str, ...], str, int]
 
 @dataclass(frozen=True)
 class Uncertain:
-    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
-    make it nominal · exp(sd z), and a zero of sd z. others: the numbers that change with it, and by how much for each standard
-    deviation, where an earlier diagnosis knew them only together; all z are then still independent before any data."""
+    """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
+    deviations make it nominal · exp(sd z), and a zero of sd z. others: the constants that change with it, and their change for
+    each standard deviation, where an earlier diagnosis knew only a combination; all z are still independent in the prior."""
 
     joint: str
     name: str
@@ -52,7 +51,7 @@ class Uncertain:
 
 
 def term_of(c: Candidate) -> Term:
-    """What a candidate is."""
+    """Name and place of a candidate."""
     return (c.name, c.where, c.options)
 
 
@@ -66,8 +65,8 @@ def labels_of(c: Candidate) -> list[Label]:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the
-    effects' sizes (`Candidate`). law: a torque beside them that nobody has named."""
+    """Effects at joints or links, in addition to the nominal law. theta (k,): standard deviations of the recalibrated constants,
+    then the effects' sizes (`Candidate`). law: an additional torque that no effect describes."""
 
     numbers: tuple[Uncertain, ...]
     effects: tuple[Candidate, ...]
@@ -76,7 +75,7 @@ class Hypothesis:
 
     @property
     def key(self) -> frozenset[Term]:
-        """Which effects there are, whatever their sizes, and on what an unnamed torque depends."""
+        """The set of effects, whatever their sizes, and the variables of an unnamed torque."""
         unnamed = () if self.law is None else [(UNNAMED, (self.law.joint,), tuple(sorted(self.law.scales)))]
         return frozenset([*(term_of(c) for c in self.effects), *unnamed])
 
@@ -97,7 +96,7 @@ class Hypothesis:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def alike(self) -> list[list[int]]:
-        """Pairs of theta that stand for one number of the law: what is recalibrated, and the effect of that name there."""
+        """Pairs of theta that represent one constant of the law: its recalibration, and the effect of that name there."""
         at: dict[tuple[str, tuple[str, ...]], int] = {
             (n.name, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
         both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
@@ -134,9 +133,9 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Prior:
-    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Student's t of sizes, half of it where they have
-    one sign: with so many degrees of freedom, and so wide, where the effect says what one in a hundred passes, that one in a
-    hundred does; else Cauchy's. center (k,), scale (k,); normal, one_sided (k,); freedom (k,)."""
+    """Prior of a hypothesis' parameters: normal for recalibrated constants and doublings, Student's t for sizes, half of it where
+    they have one sign, with degrees of freedom and width such that one in a hundred exceeds the effect's `seldom_beyond`; else
+    Cauchy's. center (k,), scale (k,); normal, one_sided (k,); freedom (k,)."""
 
     center: Array
     scale: Array

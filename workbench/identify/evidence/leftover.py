@@ -1,4 +1,4 @@
-"""What the likeliest model leaves, said so that a person can act on it: on what it depends, and the event where it is worst."""
+"""Residuals of the most probable model, described so that a person can act: the signal they depend on, and the worst event."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from workbench.identify.results.reasons import Dependence
 from workbench.types import Array
 
 EVENT = 0.5
-"""Length of a stretch that is told as one event [s]."""
+"""Length of a stretch that is reported as one event [s]."""
 STANDS = 0.1
 """Speed below which a joint stands [rad/s], some counts in a frame."""
 FULL = 0.9
@@ -45,7 +45,7 @@ def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Re
         i = next(k for k, e in enumerate(evidence) if e.name == name)
         joint = u.where[0] if u.where else ""
         event = _worst(evidence[i], residuals[i], joint) if joint in evidence[i].joints else None
-        out.append(u if event is None else replace(u, description=replace(u.description, worst=_told(event))))
+        out.append(u if event is None else replace(u, description=replace(u.description, worst=_describe(event))))
     return tuple(sorted(out, key=lambda u: -u.error))
 
 
@@ -67,12 +67,12 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
 
 
 def _middle(x: Array) -> float:
-    """Median of what was seen, NaN where nothing was."""
+    """Median of the values that were seen, NaN where there are none."""
     seen = x[np.isfinite(x)]
     return float(np.median(seen)) if len(seen) else float("nan")
 
 
-def _told(event: _Event) -> str:
+def _describe(event: _Event) -> str:
     """For a person."""
     error, _ = in_file_units(event.error, "")
     angle, _ = in_file_units(event.angle, "")

@@ -1,12 +1,12 @@
-"""The likelihood of what a model leaves, and its evidence: the only judge of the search.
+"""The likelihood of a model's residuals, and its evidence: the only criterion of the search.
 
     r ~ t(0, sqrt(noise^2 + numerics^2 + s^2)),  each frame counting frame time / (2 tau)
 
-r: recorded less simulated angles of one joint. noise: of the recording; numerics: what the simulation's step leaves open; s:
+r: recorded less simulated angles of one joint. noise: of the recording; numerics: uncertainty from the simulation's step; s:
 the model's own discrepancy (M. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63, 2001), estimated for each model by its evidence,
-so that a model that leaves less may be sure of more. tau: correlation time of what is left, measured, as neighbouring frames
-err alike; a log of a minute tells some hundred independent things, not ten thousand. The tails are Student's, as stick and slip
-are events.
+so that a model with smaller residuals has sharper parameters. tau: measured correlation time of the residuals, since the errors
+of neighbouring frames are correlated; a log of a minute holds some hundred independent samples, not ten thousand. The tails are
+Student's, as stick and slip are events.
 
 log evidence = max over s of  log p(r | theta, s) + log p(theta) + k/2 log 2 pi - 1/2 log |H|         (Laplace, at the fitted
 theta)
@@ -29,7 +29,7 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Of residuals (n,) [rad]. known (n,): noise and numerics together [rad]; span (n,): time that each frame stands for [s];
+    """Likelihood of residuals (n,) [rad]. known (n,): noise and numerics together [rad]; span (n,): time per frame [s];
     tau: correlation time [s]; tails: degrees of freedom; between: least and most discrepancy [rad]."""
 
     known: Array

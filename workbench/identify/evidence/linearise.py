@@ -1,4 +1,4 @@
-"""What each effect more would do around a fit, and the evidence that this predicts."""
+"""The response of each additional effect around a fit, and the evidence predicted from it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 """Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
 nothing until it is met."""
 SHAPES = (0.0, 2.0, -2.0)
-"""Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+"""Doublings of a parameter that only shapes an effect: a fit from a wrong start ends in a local minimum."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
 """Shares of the way between two sizes that were seen, and beyond the last and to the other side, at which lines are read."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """A hypothesis that a fit could go on to. r: what it is predicted to leave; J: its slopes; gain [nats]: of log posterior."""
+    """A hypothesis from which a fit could continue. r: predicted residuals; J: their slopes; gain [nats]: of log posterior."""
 
     hypothesis: Hypothesis
     r: Array
@@ -40,8 +40,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Probe:
-    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that
-    leaves."""
+    """A candidate at sizes x, of which parameter `moved` is its amplitude (-1: it has none); r: the residuals with it."""
 
     candidate: Candidate
     x: Array
@@ -66,7 +65,7 @@ def _neutral(effect: Effect) -> tuple[float, ...]:
 
 
 def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
-    """Every extension at some sizes, and what it predicts at its best one; the best first."""
+    """Every extension at some sizes, with the predicted gain at its best one; the best first."""
     asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
     along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
@@ -91,8 +90,8 @@ def best_of_each(moves: Sequence[Move]) -> list[Move]:
 
 
 def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
-    """Of the best moves of one effect a beam, and of those of two as many more, but only two that the same effect leads: lines
-    predict worse what comes beside it than that one is in all of them."""
+    """The best moves of one effect, as many as the beam, and as many moves of two effects, but at most two pairs per leading
+    effect, since pair predictions are less reliable than the leading effect itself."""
     out, led = list(alone[:options.beam]), Counter[object]()
     for m in both:
         leads = (m.added[0].key, m.added[0].options)
@@ -103,7 +102,7 @@ def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceO
 
 
 def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequence[Move]) -> list[Move]:
-    """Two of the best moves at once, predicted by what each does alone."""
+    """Two of the best moves at once, predicted by the sum of their responses."""
     return [_both(region, options, f, a, b) for a, b in combinations(moves[:options.paired], 2)
             if (a.added[0].key != b.added[0].key or a.added[0].key in {c.key for c in f.hypothesis.effects})
             and not _are_tied(a.added[0], b.added[0])]
@@ -114,7 +113,7 @@ def _are_tied(a: Candidate, b: Candidate) -> bool:
 
 
 def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move) -> Move:
-    """Two moves at once: each does what it does alone, and what the fit had is led after both."""
+    """Two moves at once: the responses are added, and the parameters of the fit are re-optimised linearly."""
     (one,), (two,) = a.added, b.added
     if one.key == two.key:  # two options of one effect that is there
         two = Candidate.of(two.effect, two.where, _neutral(two.effect), options=tuple(sorted({*one.options, *two.options})))
@@ -163,8 +162,8 @@ def points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
 
 
 def on_lines(none: Array, along: Sequence[Probe]) -> list[tuple[Array, Array]]:
-    """Sizes along one way of a candidate and what each is predicted to leave: by lines between those that were seen, none of it
-    being the first, and drawn out beyond the last and to the other side. none (n,): what is left without it."""
+    """Sizes along one direction of a candidate and the predicted residuals of each: linear interpolation between the simulated
+    ones, starting at none, and extrapolation beyond the last and to the other side. none (n,): residuals without it."""
     k = along[0].moved
     if k < 0:
         return [(p.x, p.r) for p in along]
@@ -209,7 +208,7 @@ def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis
 
 def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
               ) -> tuple[Hypothesis, Array, Array]:
-    """A hypothesis with the numbers that the fit had led after it on lines, what that leaves, and slopes."""
+    """A hypothesis whose other parameters are re-optimised linearly, its residuals, and slopes."""
     prior = Prior.of(h, options)
     precision = region.likelihood.precision(r, f.discrepancy)
     theta, left = h.theta.copy(), r

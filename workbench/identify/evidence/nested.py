@@ -1,9 +1,9 @@
-"""Effects held against the model without them where they stand: the Savage-Dickey density ratio.
+"""Effects compared with the same model without them: the Savage-Dickey density ratio.
 
-Of a model with an effect of sizes x and the same without it, which is x = 0, the Bayes factor is p(x = 0) / p(x = 0 | data)
-(J. Dickey, Ann. Math. Stat. 42, 1971). Two fits of a joint that sticks end some nats apart by chance, and the best of many is a
-lucky one; the covariance of slopes by regression knows of that, and refutes an effect whose size is nothing within what it is
-known to.
+For a model with an effect of sizes x and the same model without it, which is x = 0, the Bayes factor is p(x = 0) / p(x = 0 |
+data) (J. Dickey, Ann. Math. Stat. 42, 1971). Two fits of a joint that sticks end some nats apart by chance, and the best of many
+is a lucky one; the covariance of slopes by regression includes that, and refutes an effect whose size is zero within its standard
+deviation.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def told_from_nothing(region: Region, options: EvidenceOptions, best: Fitted) -> Asks[dict[Candidate, Reason]]:
-    """The effects of a fit that are less likely than not by this ratio and what an effect more costs."""
+    """The effects of a fit that are improbable by this ratio and the price of an additional effect."""
     if not best.hypothesis.effects:
         return {}
     fit = yield from regressed(region, options, best)

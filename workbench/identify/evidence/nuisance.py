@@ -61,11 +61,13 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     """The robot with numbers z standard deviations from nominal; a zero becomes an effect `zero_offset`."""
     servos = {j: model.servo(j) for j in model.joints}
     zeros: list[EffectSpec] = []
+    scales: dict[str, dict[str, float]] = {}
     for (joint, name), by in changed_by(z).items():
         if name == ZERO:
             zeros += [turned_horn(joint, by)] if by else []
-        else:
-            servos[joint] = _scaled(servos[joint], name, math.exp(by))
+        elif by:
+            scales.setdefault(joint, {})[name] = math.exp(by)
+    servos |= {joint: _scaled(servos[joint], by) for joint, by in scales.items()}
     return model.with_physics(servos, (*model.effects, *zeros))
 
 
@@ -100,12 +102,16 @@ def nominal_value(servo: ServoConstants, name: str) -> float:
     return float(getattr(servo, name))
 
 
-def _scaled(servo: ServoConstants, name: str, by: float) -> ServoConstants:
-    if name == "torque_at_full_duty":  # the back-EMF stays
-        return replace(servo, stall_torque=servo.stall_torque * by, no_load_speed=servo.no_load_speed * by)
-    if name == "back_emf":
-        return replace(servo, no_load_speed=servo.no_load_speed / by)
-    return replace(servo, **{name: getattr(servo, name) * by})  # type: ignore[arg-type]
+def _scaled(servo: ServoConstants, scales: Mapping[str, float]) -> ServoConstants:
+    out = {"stall_torque": servo.stall_torque, "no_load_speed": servo.no_load_speed}
+    for name, by in scales.items():
+        if name == "torque_at_full_duty":  # the back-EMF stays
+            out = {**out, "stall_torque": out["stall_torque"] * by, "no_load_speed": out["no_load_speed"] * by}
+        elif name == "back_emf":
+            out["no_load_speed"] /= by
+        else:
+            out[name] = getattr(servo, name) * by
+    return replace(servo, **out)  # type: ignore[arg-type]
 
 
 def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Array) -> RobotModel:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -75,12 +75,13 @@ class EvidenceOptions:
     the discrepancy over windows up to which that over whole logs may be, for these to judge. far: standard deviations that a
     number of the nominal law may be recalibrated by; its prior prices them. stride: of differences, in standard deviations of the
     prior or typical sizes: stick and slip answers smaller ones with noise; spread: of the moves that tell the last slopes,
-    likewise: half of what was known before. iterations: most steps of a fit. beam: states that are extended, and moves of one
-    effect that are fitted of each; refined: moves of one or two that are, led of these by the same one; paired: of the best
-    moves, those that are also predicted two at a time. most: effects of one joint. seconds: of all takes together that the search
-    looks at, their beginnings; the last fit sees all. most_work [s]: of a puppy's rollouts at the search's step
-    (`RolloutEvaluator.work`), after which nothing more is tried unless the search is to be thorough: about an hour of a
-    processor, several times what twelve logs of a servo need.
+    likewise: half of what was known before. iterations: most steps of a fit. starts: of the plain fit: through stick and slip,
+    fits of one model end up to 20 nats apart, and an effect would win for want of a better plain fit. beam: states that are
+    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are, led of these by the same
+    one; paired: of the best moves, those that are also predicted two at a time. most: effects of one joint. seconds: of all takes
+    together that the search looks at, their beginnings; the last fit sees all. most_work [s]: of a puppy's rollouts at the
+    search's step (`RolloutEvaluator.work`), after which nothing more is tried unless the search is to be thorough: about an hour
+    of a processor, several times what twelve logs of a servo need.
 
     drift: where the nominal robot is one that was diagnosed before, what may have changed since; None: it is one as drawn.
     formal: how many times its formal standard deviations a servo's law is off: differences through stick and slip claim to know
@@ -106,6 +107,7 @@ class EvidenceOptions:
     stride: float = 0.15
     spread: float = 0.5
     iterations: int = 5
+    starts: int = 4
     beam: int = 3
     refined: int = 9
     led: int = 2
@@ -126,6 +128,16 @@ class EvidenceOptions:
     law: LawOptions = field(default_factory=LawOptions)
     sure: float = 3.0
     refuted: float = 0.3
+
+    def without_names(self) -> EvidenceOptions:
+        """For servo logs without a gap: the law is calibrated, and no effect is looked for."""
+        return replace(self, most=0)
+
+    @classmethod
+    def since(cls) -> EvidenceOptions:
+        """Of a robot that was diagnosed before: as its law is known, few models come close to the best, and a narrower search
+        finds them."""
+        return cls(drift=SinceThen(), beam=2, refined=4, paired=6)
 
 
 @dataclass(frozen=True)

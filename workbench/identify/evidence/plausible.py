@@ -1,4 +1,4 @@
-"""Names checked against what is plausible on the robot: an effect that wants to go further than that is something else."""
+"""Effects checked against plausible sizes on the robot: one whose fit ends at the largest plausible size is something else."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Re
 
 
 def _distances(c: Candidate, x: Array) -> Iterator[tuple[Parameter, float, float]]:
-    """Each parameter, what it is, and how far that is from neutral; of a vector, its length in place of what it is."""
+    """Each parameter, its value, and its distance from neutral; for a vector, its length instead of its value."""
     values, neutral = iter(c.values(x)), iter(c.neutral)
     for p in c.given:
         n = 3 if p.vector else 1

@@ -32,7 +32,7 @@ class RegionPosterior:
         return min(1.0, sum(w for f, w in self.weights if f.hypothesis.law is not None))
 
     def unnamed_instead(self, of: Named) -> tuple[tuple[str, ...], float]:
-        """On what an unnamed torque depends in the likeliest model that has one in the place of an effect, and the probability of
+        """The variables of an unnamed torque in the most probable model that has one instead of an effect, and the probability of
         all such models."""
         models = [(f, w) for f, w in self.weights if f.hypothesis.law is not None and of not in _names(f)]
         if not models:
@@ -57,7 +57,7 @@ class RegionPosterior:
         return {other: w for other, w in out.items() if w >= CONCLUSIONS.same_elsewhere * self.named[of]}
 
     def rival(self, of: Named, besides: Collection[Named] = ()) -> tuple[Named, float] | None:
-        """What is likeliest where `of` is not: an effect that the best model does not have, and that is none of `besides`."""
+        """The most probable alternative to `of`: an effect that the best model does not have, and that is not in `besides`."""
         kept = _names(self.best) | set(besides)
         family = known_effects()[of[0]].family
         instead: dict[Named, float] = {}

@@ -1,4 +1,4 @@
-"""A region: what is judged together, with what could be wrong there."""
+"""A region: channels that are judged together, and the candidates that may act there."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 SPAN = 0.02
 """Between the frames that are looked at [s]: neighbours closer than that tell the same."""
 LOST = 1.0
-"""Residual that stands for a rollout that went astray [rad]."""
+"""Residual of a rollout that diverged [rad]."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording;
-    scale (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
+    """Part of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a
+    recording; scale (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time per frame [s]."""
 
     take: int
     rows: Mask

@@ -1,4 +1,4 @@
-"""Names checked against what the servos measured themselves: a register of voltage that never sags refutes a sag."""
+"""Effects checked against the servos' own measurements: a register of voltage that never sags refutes a sag."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workbench.identify.results.reasons import RefutedByRegister
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
-    """What the servos' registers said, log by log."""
+    """The servos' registers, log by log."""
     out = []
     for t in takes:
         channels, duty, nominal = t.recording.channels, {}, {}
@@ -36,8 +36,8 @@ def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
 
 def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
-    """Candidates as far as the registers let them go, and those that they refute: of which not even `refuted` of the
-    typical size is within `sure` standard errors of what a register says."""
+    """Candidates limited to the range allowed by the registers, and those refuted: for which even `refuted` of the
+    typical size is further than `sure` standard errors from the register's value."""
     logs, kept, refuted = registers_of(takes), [], []
     for c in candidates:
         told = c.effect.in_registers(logs, c.where)

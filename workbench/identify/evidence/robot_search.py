@@ -1,4 +1,4 @@
-"""The search of a robot of several joints: of its joints side by side, and of what acts in all of them at once."""
+"""The search of a robot of several joints: of its joints in lockstep, and of effects that act on all of them at once."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotFound:
-    """What stands: rollouts with it, what was found by region, and all of it together. instead: the likeliest other model [nats]
-    by the effect of the whole robot that it puts in the place of ours; None: the joints alone. rivals: by a joint's effect, the
-    best one of the whole robot in its place, and by how much that is likelier [nats]."""
+    """State of the search: rollouts, the results by region, and all of them together. instead: the best alternative model [nats]
+    by the effect of the whole robot that it has instead of ours; None: the joints alone. rivals: by a joint's effect, the
+    best one of the whole robot that could replace it, and its advantage in log posterior [nats]."""
 
     rollouts: Rollouts
     found: tuple[Found, ...]
@@ -35,7 +35,7 @@ class RobotFound:
 
     @property
     def sure(self) -> float:
-        """Probability of the effects of the whole robot, all others being what was tried in their place."""
+        """Probability of the effects of the whole robot, against every alternative that was tried."""
         if not self.together.shared.effects:
             return 0.0
         others = [min(nats - self.together.log_posterior, 700.0) for _, nats in self.instead]
@@ -43,9 +43,9 @@ class RobotFound:
 
 
 def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: EvidenceOptions, report: Progress) -> RobotFound:
-    """Searches joints and robot. names: effects that act in all joints at once. What acts in all goes first where it explains a
-    good part of what the best effect in each joint would, and is then weighed against the search without it; else it is looked
-    for beside what the joints are found to have."""
+    """Searches joints and robot. names: effects that act on all joints at once. Such an effect goes first where it explains a
+    good part of the gain of the best effect in each joint, and is then compared with the search without it; else it is searched
+    for in addition to the joints' effects."""
     if not names:
         whole, found = search(rollouts, options, report)
         return RobotFound(whole, found, Whole(whole, (), options).begun([f.best for f in found]))
@@ -66,7 +66,7 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
 
 def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Progress
            ) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was begun, with an effect of the whole robot where that comes first."""
+    """The first fits, with an effect of the whole robot where that comes first."""
     report("effects of the whole robot", None)
     whole = Whole(rollouts, tuple(names), options)
     alone = whole.begun([f.best for f in found])
@@ -101,8 +101,8 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
 
 
 def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Candidate, Together]]:
-    """Each joint's effect with what stands where the best one of the whole robot is in its place: a tilted stand turns an arm's
-    first joint as a horn does that is set on wrongly."""
+    """Each joint's effect, compared with the best effect of the whole robot as its replacement: a tilted stand turns an arm's
+    first joint in the same way as a wrongly mounted horn."""
     out = []
     for k, f in enumerate(found):
         for c in f.best.hypothesis.effects:
@@ -113,14 +113,15 @@ def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Ca
 
 
 def _beside(rollouts: Rollouts, found: Sequence[Found], at: Together) -> tuple[Rollouts, tuple[Found, ...]]:
-    """With shared effects, and the fits beside them, standing."""
+    """State with shared effects and the fits of the regions."""
     states = tuple(replace(f, fits={**(f.fits if f.fits and fit.hypothesis.key == f.best.hypothesis.key else {}),
                                     fit.hypothesis.key: fit}) for f, fit in zip(found, at.fits))
     return standing(replace(rollouts, shared=at.shared), states), states
 
 
 def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], options: EvidenceOptions) -> RobotFound:
-    """The likelier one, beside the others, all judged by the same correlation times: the shorter, as a poor model's are long."""
+    """The more probable state, and the other, both judged by the same correlation times: the shorter, since a poor model's are
+    long."""
     taus = [min(a.region.likelihood.tau, b.region.likelihood.tau) for a, b in zip(at.found, alone.found)]
 
     def anew(of: Together, rollouts: Rollouts) -> Together:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Together:
-    """What stands in all regions. shared: effects of the whole robot; fits: by region, beside them; slopes (n, k): by region, of
-    its residuals by the shared numbers; covariance (k, k) of these; log_posterior [nats] of all."""
+    """Fits of every region. shared: effects of the whole robot; fits: by region, with these; slopes (n, k): by region, of
+    its residuals by the shared parameters; covariance (k, k) of these; log_posterior [nats] of the whole."""
 
     shared: Hypothesis
     fits: tuple[Fitted, ...]
@@ -64,12 +64,12 @@ class Whole:
         return self.rollouts.regions
 
     def begun(self, fits: Sequence[Fitted]) -> Together:
-        """Regions beside what is shared, of which no slopes are known yet."""
+        """Regions with shared effects whose slopes are not known yet."""
         shared = self.rollouts.shared
         return self.judged(shared, fits, [np.zeros((len(f.r), len(shared.theta))) for f in fits])
 
     def judged(self, shared: Hypothesis, fits: Sequence[Fitted], slopes: Sequence[Array]) -> Together:
-        """All regions and what they share, where they stand."""
+        """The regions and their shared effects, at the current parameters."""
         prior = Prior.of(shared, self.options)
         S = np.diag(prior.precision(shared.theta))
         for region, f, G in zip(self.regions, fits, slopes):
@@ -155,7 +155,7 @@ class Whole:
         return self.judged(shared, fits, slopes)
 
     def _step(self, at: Together, share: float) -> tuple[Hypothesis, list[Hypothesis]]:
-        """A share of the Gauss-Newton step of all numbers."""
+        """A share of the joint Gauss-Newton step."""
         prior = Prior.of(at.shared, self.options)
         P = prior.precision(at.shared.theta)
         S, b, parts = np.diag(P), P * (at.shared.theta - prior.center), []

@@ -17,15 +17,15 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 Wants = tuple[int, Hypothesis]
-"""A region, by its index, and what it wants rolled out."""
+"""A region, by its index, and its request for rollouts."""
 
 
 @dataclass(frozen=True)
 class Rollouts:
-    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
-    errors: of the time step, which are subtracted; they are measured on `reference`, a model near those that are compared.
+    """Rolls out hypotheses of all regions. standing: hypotheses used for the others while one region is examined.
+    errors: of the time step, which are subtracted; they are measured on `reference`, a model close to the compared ones.
     step: in steps of the search. horizon [s]: of windows, each of which starts from the recorded state. shared: effects of the
-    whole robot, which act in all regions. most_work: after which nothing more is tried, as `RolloutEvaluator.work` counts it."""
+    whole robot, which act in all regions. most_work: limit of the work, as `RolloutEvaluator.work` counts it."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel

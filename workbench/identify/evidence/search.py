@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import hadamard
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
@@ -127,8 +128,17 @@ def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
     (r,) = yield [h]
     region = region.correlated(min(options.explored, region.correlation(r)))
     s = region.likelihood.discrepancy(r)
-    fit = yield from fitting(region, options, h, s, options.iterations, r)
+    fits = yield from side_by_side([fitting(region, options, at, s, options.iterations) for at in _spread(h, options.starts)])
+    better = yield from side_by_side([polished(region, options, f) for f in fits])
+    fit = yield from polished(region, options, max(better, key=lambda f: f.log_posterior))
     return region, fit
+
+
+def _spread(h: Hypothesis, starts: int) -> list[Hypothesis]:
+    """Where a plain fit begins: as published, and elsewhere, a standard deviation of every number to one side or the other."""
+    n = len(h.theta)
+    signs = hadamard(1 << max(n, starts).bit_length())[1:starts, 1:n + 1]
+    return [h, *(h.at(np.clip(h.theta + row, *h.bounds())) for row in signs)]
 
 
 def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
@@ -193,7 +203,8 @@ def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis
     fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
-                                    fitting(region, options, _as_published(h), f.discrepancy, options.iterations)])
+                                    fitting(region, options, _as_published(h), f.discrepancy, options.iterations, None,
+                                            None if shaped else m.J)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
@@ -225,6 +236,12 @@ def _refitted(found: Found, options: EvidenceOptions) -> Asks[Found]:
 def _as_published(h: Hypothesis) -> Hypothesis:
     """With none of the nominal law's numbers recalibrated."""
     return h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
+
+
+def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) -> Found:
+    """With more fits, as far as they are of the same uncertain numbers."""
+    mine = [judged(found.region, options, f.hypothesis, f.r, f.J) for f in fits if f.hypothesis.numbers == found.region.numbers]
+    return replace(found, fits=_with_better(found.fits, mine))
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:

@@ -1,9 +1,9 @@
-"""What the step of a rollout is wrong by, taken off its residuals.
+"""The time-step error of a rollout, subtracted from its residuals.
 
-A discrete step of a servo robot is of the first order: what is sent at an instant acts late by about half a step, in a joint that
-follows steps of its goal by more. At the steps of a search that is more than a log's noise, and a fit would take it for torque,
-friction or delay. Richardson's extrapolation gives it, from rollouts at half and at a quarter of the search's step
-(L. Richardson, Phil. Trans. A 226, 1927), of the best model so far; models near it are taken to have the same error.
+A discrete step of a servo robot is of the first order: a command acts about half a step late, and later in a joint that follows
+steps of its goal. At the steps of a search that is more than a log's noise, and a fit would take it for torque, friction or
+delay. Richardson's extrapolation estimates it, from rollouts at half and at a quarter of the search's step
+(L. Richardson, Phil. Trans. A 226, 1927), of the best model so far; models close to it are taken to have the same error.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
 
 
 def extrapolated(longer: Array, shorter: Array) -> Array:
-    """Residuals in the limit of a step of zero, from those at one step and at half of it: alike in shape."""
+    """Residuals in the limit of a step of zero, from those at one step and at half of it, of the same shape."""
     return np.asarray(2.0 * shorter - longer)
 
 
@@ -37,7 +37,7 @@ class StepErrors:
     _ideal: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def at(self, model: RobotModel, step: float, horizon: float = np.inf) -> Residuals:
-        """By take what a model's rollouts at a step, in steps of the search, add to residuals (N, c) [sigma]; 0 where unknown.
+        """By take the error that a step, in steps of the search, adds to a model's residuals (N, c) [sigma]; 0 where unknown.
         horizon [s]: of windows."""
         key = (model.sha256, horizon)
         if (*key, step) not in self._known:

@@ -30,9 +30,9 @@ TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_frict
 
 @dataclass(frozen=True)
 class AsTorque:
-    """An effect compared with a change of all torques of the servo. by: the change of their logarithm that resembles the effect
+    """An effect compared with a change of the servo's torque scale. by: the change of its logarithm that resembles the effect
     most; alike: the share of the effect's response that this change reproduces; share: probability that it is the effect, where
-    both explain the same; known: standard deviation of the logarithm of the servo's common torque scale, before any data."""
+    both explain the same; known: standard deviation of the logarithm of the servo's common torque scale in the prior."""
 
     by: float
     alike: float

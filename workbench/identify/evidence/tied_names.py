@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.identify.conclusions import estimates
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, side_by_side
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain
 from workbench.identify.evidence.linearise import linearised
 from workbench.identify.evidence.nuisance import mixing
@@ -73,6 +73,7 @@ def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[li
     bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
     moves = yield from linearised(told, options, bare)
     fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    fits = yield from side_by_side([polished(told, options, g) for g in fits])
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
     return sorted(within, key=lambda g: -g.log_evidence)
 

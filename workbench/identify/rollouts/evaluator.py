@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import joblib
@@ -17,12 +18,13 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
-from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
+from workbench.identify.rollouts.servo_logs import block_angles, frames, is_log, question_angles
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
+from workbench.simulation.cluster import in_blocks, on_cluster
 from workbench.types import Array
 
 
@@ -39,8 +41,8 @@ class RolloutRequest:
 
 
 class RolloutEvaluator:
-    """Rolls models out on the session's takes and evaluates the residuals. memory: what was rolled out before, or a folder in
-    which every rollout is kept, so that a killed run resumes; results are the same with and without."""
+    """Rolls models out on the session's takes and evaluates the residuals. memory: cached rollouts, or a folder in which every
+    rollout is kept, so that a killed run resumes; results are the same with and without."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | RolloutMemory | None = None) -> None:
@@ -116,17 +118,17 @@ class RolloutEvaluator:
 
     def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
         """Angles of logs, by question, each as soon as those before it are there."""
-        def rolled(of: tuple[RolloutRequest, Mapping[int, str]]) -> list[Array] | None:
-            q, takes = of
-            config = replace(self.config, time_step=q.step * self.config.time_step)
-            return log_angles([self.evidence[i] for i in takes], q.model, config, q.horizon)
-
+        wanted = [(q, tuple(takes)) for q, takes in asked]
+        rolled = partial(question_angles, self.evidence, self.config)
         if self.n_jobs == 1 or len(asked) < 2:
-            yield from map(rolled, asked)
+            yield from map(rolled, wanted)
+            return
+        if on_cluster():
+            yield from in_blocks(partial(block_angles, self.evidence, self.config), wanted, self.n_jobs)
             return
         with ThreadPoolExecutor(self.n_jobs) as pool:  # kernels hold no lock
             try:
-                yield from pool.map(rolled, asked)
+                yield from pool.map(rolled, wanted)
             finally:
                 pool.shutdown(cancel_futures=True)
 
@@ -138,7 +140,7 @@ class RolloutEvaluator:
         return np.asarray((e.recorded - simulated) / (e.sigma * e.rough))
 
     def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
-        """The same on other takes of the same robot, or on these looked at otherwise; what one is answered the other knows."""
+        """The same on other takes of the same robot, or on these with another observation; both share their rollouts."""
         return RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
 
     @property
@@ -182,9 +184,9 @@ class RolloutEvaluator:
 
     def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
                share: float | Array = 0.0, everywhere: bool = False) -> float:
-        """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
-        has gone of it since `before`. everywhere: of floating-base takes beyond noise, as steps and contact models rarely make
-        them as wrong as they may, and of all channels, as what moves the robot shows a little in each."""
+        """Chi squared beyond the expectation of a correct model, of the channels that have a gap, and beyond this share of their
+        reduction since `before`. everywhere: for floating-base takes beyond noise alone, since errors of steps and contact models
+        are rarely as large as allowed, and for every channel, since effects on the robot's motion appear a little in each."""
         cost, expected = self.by_channel(residuals, use)
         was = cost if before is None else self.by_channel(before, use)[0]
         may_err = share * np.maximum(was - cost, 0.0)
@@ -196,7 +198,7 @@ class RolloutEvaluator:
 
     def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
                without: Collection[str] = ()) -> float:
-        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing.
+        """Share of `before`'s gaps that is closed in `after`, in the channels that had one, so that good channels hide nothing.
         without: joints whose channels do not count."""
         cost, expected = self.by_channel(before, use, joint)
         left, _ = self.by_channel(after, use, joint)
@@ -220,7 +222,7 @@ class RolloutEvaluator:
         return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
 
     def by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
-        """Chi squared of each take's each channel, and what is expected of it."""
+        """Chi squared of each channel of each take, and its expectation."""
         cost, expected = [np.empty(0)], [np.empty(0)]
         for i, r in sorted(residuals.items()):
             e = self.evidence[i]

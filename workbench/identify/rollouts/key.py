@@ -1,4 +1,4 @@
-"""What a rollout's channels depend on, as a name under which they are remembered.
+"""Everything that a rollout's channels depend on, as a name under which they are remembered.
 
 The robot, its effects, the take (commands, frames, start, windows, how it is looked at), the configuration, engine and step, and
 the code that rollouts run through; not the code of the search, so that a change of that finds every rollout again.

@@ -1,4 +1,4 @@
-"""What was rolled out already: in memory up to a number of bytes, and in a folder, so that a killed run resumes.
+"""Cached rollouts: in memory up to a number of bytes, and in a folder, so that a killed run resumes.
 
 In the folder each process appends to a file of its own, which others read when they begin, so that two runs may share a folder.
 A record is a header (digest of the key, bytes a number, rows, columns, checksum) and the numbers; a record that was not written

@@ -21,6 +21,7 @@ from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
+    from workbench.identify.rollouts.evaluator import RolloutRequest
 
 SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
@@ -64,3 +65,17 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
     except NotCoveredError:
         return None
     return [q[:, [model.joints.index(j) for j in e.joints]] for e, q in zip(takes, angles)]
+
+
+def question_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig, question: tuple[RolloutRequest, tuple[int, ...]]
+                    ) -> list[Array] | None:
+    """`log_angles` of a request on some of the takes. config: of the search, whose steps the request counts."""
+    q, takes = question
+    config = replace(config, time_step=q.step * config.time_step)
+    return log_angles([evidence[i] for i in takes], q.model, config, q.horizon)
+
+
+def block_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
+                 questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
+    """The same of several requests, in a worker of a cluster."""
+    return [question_angles(evidence, config, question) for question in questions]

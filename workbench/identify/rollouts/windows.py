@@ -1,8 +1,8 @@
 """A log cut into windows, each of which starts from the state that was recorded there.
 
-Over seconds an arm that sticks and slips goes elsewhere by chance: an open-loop rollout of a whole log jumps when a number
-changes a little, and one missed slip is in all that follows. From recorded states, over less than a second, residuals answer
-nearly linearly to what is wrong (multiple shooting; H. G. Bock, Springer Ser. Chem. Phys. 18, 1981).
+Over seconds an arm that sticks and slips diverges by chance: an open-loop rollout of a whole log jumps when a parameter changes a
+little, and one missed slip affects everything after it. From recorded states, over less than a second, residuals depend nearly
+linearly on the errors of the model (multiple shooting; H. G. Bock, Springer Ser. Chem. Phys. 18, 1981).
 """
 
 from __future__ import annotations

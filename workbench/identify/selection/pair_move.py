@@ -49,11 +49,11 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     ranked = sorted(zip(fits, pairs), key=lambda f: penalised_cost(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
-    instead = [_beside_tried(r, first) for r in selection_steps(search, rest, ranked)]
+    instead = [_with_first_trials(r, first) for r in selection_steps(search, rest, ranked)]
     return ranked[0][0], [*(r for r in rounds if r is not first), *instead]
 
 
-def _beside_tried(taken: SelectionStep, first: SelectionStep) -> SelectionStep:
+def _with_first_trials(taken: SelectionStep, first: SelectionStep) -> SelectionStep:
     """A round with the other first candidates: the equivalent effect of a pull has to be tried as its replacement."""
     fitted = {t.candidate.key for t in taken.trials}
     return replace(taken, trials=(*taken.trials, *(t for t in first.trials if t.candidate.key not in fitted)))

@@ -69,7 +69,7 @@ class CandidateEvaluation:
         self.walking = evaluator.any_floating(tuple(base))
         self.base, self.takes = base, tuple(base)
         self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
-        self.r0 = self._left(base)
+        self.r0 = self._vectors_by_joint(base)
         self.power = {i: evaluator.cost({i: r}, "fit") for i, r in base.items()}
         alone = self.coarse and self.walking  # floating-base takes are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
@@ -86,12 +86,12 @@ class CandidateEvaluation:
         if not alive:
             return out
         steps = SCREENING.steps_walking if self.walking else SCREENING.steps
-        sizes = yield from self._fitted([starts[b] for b in alive], alive, steps)
+        sizes = yield from self._fit([starts[b] for b in alive], alive, steps)
         finely = self.coarse and self.walking  # coarse steps say where to go, not what a walk makes of small differences
         question = self._question(alive, sizes)
         (final,) = yield [replace(question, step=1.0) if finely else question]
-        final = final if finely else self._told(final)
-        return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
+        final = final if finely else self._fine_residuals(final)
+        return out + [self._judge(b, x, final) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
         """Sizes and gains as responses of an earlier screening predict them, where that is hopeless; None: to be looked at."""
@@ -110,8 +110,8 @@ class CandidateEvaluation:
         probes = scan(c, scan_sizes(c, self.walking, self.race.no_fixed_base), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse) for q in looks]
-        before = self._left(plain)
-        responses = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
+        before = self._vectors_by_joint(plain)
+        responses = [[v - w for v, w in zip(self._vectors_by_joint(a), before)] for a in answers]
         self.responses[self._name] = probes, responses
         guess = self._guessed(probes, responses)
         calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
@@ -153,7 +153,7 @@ class CandidateEvaluation:
     def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
         """Initial sizes and their predicted gain, on all takes and on those that were simulated."""
         looked_at = {i: self.base[i] for i in self.looked_at}
-        r0 = self._left(looked_at)
+        r0 = self._vectors_by_joint(looked_at)
         far = SCREENING.far_walking if self.walking else SCREENING.far
         guesses = [
             linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in responses], far) for b, c in enumerate(self.group)
@@ -178,14 +178,14 @@ class CandidateEvaluation:
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
                 if g > least and g >= worth * best_at(race.predicted, j) and (j is not None or g >= last)]
 
-    def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
+    def _fit(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
         self.without, answer = yield [self._question([], []), self._question(alive, starts)]
-        first = self._left(self._told(answer))
+        first = self._vectors_by_joint(self._fine_residuals(answer))
 
         def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
             return (yield from through(self._stepping(start, leaves, alive, n, since), lambda p: self._question(alive, p),
-                                       lambda answer: [self._left(self._told(answer))[b] for b in alive]))
+                                       lambda answer: [self._vectors_by_joint(self._fine_residuals(answer))[b] for b in alive]))
 
         solved = yield from improved(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
@@ -204,7 +204,7 @@ class CandidateEvaluation:
             return fit_blocks(start, leaves, bounds, n, FIT.stride_fixed, since)
         return fit_blocks(start, leaves, bounds, n, FIT.stride_free, since, self.group[which[0]].magnitudes(start[0]))
 
-    def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> CandidateFit:
+    def _judge(self, b: int, x: Array, answer: dict[int, Array]) -> CandidateFit:
         joint = self.joints[b]
         off = {
             use: self.evaluator.cost(self.base, use, joint) - self.evaluator.cost(answer, use, joint) for use in ("fit", "choose")
@@ -218,9 +218,9 @@ class CandidateEvaluation:
         model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
         return RolloutRequest(model, self.takes, PROBLEM.coarse if self.coarse else 1.0)
 
-    def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
+    def _fine_residuals(self, answer: dict[int, Array]) -> dict[int, Array]:
         """Residuals of an answer: the difference at coarse steps, added to the residuals at the search's step."""
         return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
 
-    def _left(self, answer: dict[int, Array]) -> list[Array]:
+    def _vectors_by_joint(self, answer: dict[int, Array]) -> list[Array]:
         return [self.evaluator.vector(answer, "fit", j) for j in self.joints]

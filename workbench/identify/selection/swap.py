@@ -43,7 +43,7 @@ def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], take
     """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
     replaced, until none of these is better."""
     joint = worst_joint(beyond)
-    sets = _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+    sets = _fit_sets(search, current, several(search, current, trials, takes, beyond), takes)
     if joint is None or not sets:
         return []
     for _ in range(SUBSETS.exchanges):
@@ -56,7 +56,7 @@ def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], take
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
         new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
                if frozenset(t.candidate.key for t in s) not in known]
-        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: penalised_cost(f[0]))
+        sets = sorted([*sets, *_fit_sets(search, current, new, takes)], key=lambda f: penalised_cost(f[0]))
         if sets[0][0] is fit:
             break
     return sets
@@ -68,7 +68,7 @@ def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> b
     return bool(left.sum() < SUBSETS.right * expected.sum())
 
 
-def _fitted(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...],
+def _fit_sets(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...],
             ahead: int = SUBSETS.ahead) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
     begun = search.side_by_side([fitted_beside(search, current, chosen, takes, SUBSETS.most_steps) for chosen in sets])
@@ -92,7 +92,7 @@ def exchanges(
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
     if not mine or not others:
         return []
-    moves = [_moved(c, there[c.key]) for c in mine]
+    moves = [_perturb(c, there[c.key]) for c in mine]
     probes = [scan(t.candidate, FIT.scanned, walking=False) for t in others]
     asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
     asked += [fit.sizes_without(c.key) for c in mine]
@@ -115,7 +115,7 @@ def exchanges(
     return out
 
 
-def _moved(c: Candidate, x: Array) -> list[Array]:
+def _perturb(c: Candidate, x: Array) -> list[Array]:
     """Sizes with one number moved at a time."""
     return list(x + np.diag(steps_of(x, *c.bounds(), FIT.stride_fixed)))
 

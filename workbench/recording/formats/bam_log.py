@@ -20,22 +20,30 @@ from workbench.types import Array
 _FULL_DUTY = 885.0
 """PWM register of an XL-330 at full duty; its load register holds the PWM, negatives as unsigned 16 bit."""
 _SUPPLY, _LEAST_VOLTS = 0.1, 0.5
-"""By how much the supply may differ from what was measured: a share of it, a drop under load, and [V] at least."""
+"""Allowed difference between supply and measured voltage: a share of it, a drop under load, and [V] at least."""
 _CHANNELS = {"goal_position": "goal", "position": "position", "speed": "velocity", "temp": "temperature"}
 _REQUIRED = ("timestamp", "position", "goal_position")
 
 
+def _is_calibration(content: Any) -> bool:
+    return isinstance(content, dict) and bool(content) and all(
+        isinstance(of, dict) and "homing_offset" in of for of in content.values())
+
+
 def read_bam_log(path: str | Path) -> Recording:
-    """Reads a BAM log: rad, rad/s, volts and degrees Celsius as they stand; the load register becomes `duty`.
+    """Reads a BAM log: rad, rad/s, volts and degrees Celsius unchanged; the load register becomes `duty`.
 
     Time is the log's own. The joint has no name in the file and is called by its motor; a take calls it by the model's one joint.
-    InputError where it is no JSON, cut, lacks an entry's key or holds what is no number.
+    InputError where it is not JSON, is cut, lacks an entry's key or contains something other than a number.
     """
     source = str(path)
     content = read_json(path)
     if not isinstance(content, dict) or not isinstance(content.get("entries"), list) or not content["entries"]:
         keys = ", ".join(map(str, list(content)[:6])) if isinstance(content, dict) else ""
         found = f"one with {keys or 'nothing'}" if isinstance(content, dict) else "another value"
+        if _is_calibration(content):
+            raise InputError(source, "a calibration file of LeRobot (ids, homing offsets and ranges of servos), no recording; "
+                                     "expected a BAM log, a JSON object with a list 'entries'")
         raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)

@@ -20,7 +20,7 @@ _MM = "_mm"
 
 
 def _bodies(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
-    """Columns of each body by what they hold."""
+    """Columns of each body by quantity."""
     out: dict[str, dict[str, int]] = {}
     for i, name in enumerate(names):
         body, dot, what = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""C3D files of motion capture, by the package ezc3d: rigid bodies where the file has them, else of markers named alike."""
+"""C3D files of motion capture, by the package ezc3d: rigid bodies where the file has them, else of markers with a common name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MARK = 0x50
 
 
 def matches(head: bytes) -> bool:
-    """Told by its second byte, and by zeros that no text has."""
+    """Recognised by its second byte, and by zeros that no text has."""
     return len(head) >= 512 and head[1] == _MARK and 1 <= head[0] <= 20 and b"\0" in head[:64]
 
 

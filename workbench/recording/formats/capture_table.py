@@ -26,7 +26,7 @@ _THIN = 0.05
 
 @dataclass(frozen=True)
 class Capture:
-    """What a capture system's file holds. time: (N,) [s]. bodies: name -> (p (N, 3) [m], quat (N, 4) wxyz). markers: name ->
+    """Content of a capture system's file. time: (N,) [s]. bodies: name -> (p (N, 3) [m], quat (N, 4) wxyz). markers: name ->
     (N, 3) [m]. up: which axis of the file is up, "y" or "z"; with z up, x and y are level."""
 
     time: Array
@@ -51,16 +51,34 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
     if capture.up == "z":
         bodies = {name: BodyTrack(_y_up(b.p), np.concatenate([b.quat[:, :1], _y_up(b.quat[:, 1:])], axis=1))
                   for name, b in bodies.items()}
-    problems = list(capture.problems)
+    problems = [*capture.problems, *doubts(capture)]
     if not bodies and markers:
         bodies = bodies_of_markers(markers)
         if bodies:
-            problems.append(f"rigid bodies are formed of markers whose names begin alike: {', '.join(bodies)}; each is taken "
-                            f"to stand "
+            problems.append(f"rigid bodies are formed of markers with a common name: {', '.join(bodies)}; each is taken "
+                            f"to be "
                             "upright, without a rotation, in the first frame that shows all its markers")
     return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=np.arange(len(time)),
                      rate=rate_of(time), units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems),
                      sensing="mocap")
+
+
+def doubts(capture: Capture, slowest: float = 0.5, farthest: float = 20.0) -> list[str]:
+    """What in a capture contradicts a small robot in a room: frames further apart than `slowest` [s], places further from each
+    other than `farthest` [m], and quaternions whose scalar comes last."""
+    out = []
+    apart = float(np.median(np.diff(capture.time)))
+    if apart > slowest:
+        out.append(f"time: frames are {apart:g} apart: are the times frame numbers or milliseconds? (seconds are expected)")
+    seen = [p[np.isfinite(p).all(axis=1)] for p in (*(p for p, _ in capture.bodies.values()), *capture.markers.values())]
+    places = np.concatenate([p for p in seen if len(p)]) if any(map(len, seen)) else np.zeros((1, 3))
+    if (size := float(np.ptp(places, axis=0).max())) > farthest:
+        out.append(f"places lie up to {size:.4g} m apart: are they in millimetres? (metres are expected, or columns BODY.x_mm)")
+    first = [q[np.isfinite(q).all(axis=1)][:1] for _, q in capture.bodies.values()]
+    turned = [abs(float(q[0, 3])) > 0.97 for q in first if len(q)]
+    if turned and all(turned):
+        out.append("every body begins turned half round about z (qw near 0, qz near 1): are the quaternions written x, y, z, w?")
+    return out
 
 
 def _y_up(v: Array) -> Array:
@@ -86,11 +104,11 @@ def bodies_of_markers(markers: Mapping[str, Array]) -> dict[str, BodyTrack]:
         sizes = np.linalg.svd(shape, compute_uv=False)
         if sizes[1] < _THIN * sizes[0]:
             continue
-        out[body] = _fitted(at, shape)
+        out[body] = _fit_body(at, shape)
     return out
 
 
-def _fitted(at: Array, shape: Array) -> BodyTrack:
+def _fit_body(at: Array, shape: Array) -> BodyTrack:
     """The path of a body whose markers (M, 3) [m] about their middle are seen at (N, M, 3): least squares, in frames that show
     three of them at least."""
     p, q = np.full((len(at), 3), np.nan), np.full((len(at), 4), np.nan)

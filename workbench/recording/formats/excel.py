@@ -14,7 +14,7 @@ from workbench.recording.formats.registry import RecordingFormat, format_of
 from workbench.recording.recording import Recording
 
 _MOST = 64 << 20
-"""Of the file, and of what is packed in it [bytes]."""
+"""Largest size of the file, and of its unpacked content [bytes]."""
 _DAMAGED = (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, IndexError, TypeError, AttributeError)
 
 

@@ -1,4 +1,4 @@
-"""What a file of robot motion holds, told by its content."""
+"""The kind of a file of robot motion, recognised by its content."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Literal
 
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary, plain_head, split_row
+from workbench.recording.formats.foreign import joint_columns
 from workbench.recording.formats.registry import format_of
 from workbench.recording.formats.rollout_table import is_rollout
 
@@ -33,4 +34,6 @@ def file_kind(path: str | Path) -> Kind:
     cells = split_row(first)
     plain = "time" in cells and not any(mark in c.removeprefix("speed.") for c in cells for mark in "./[")
     numbers = bool(cells) and all(number_of(c) is not None for c in cells)
+    if plain and joint_columns(cells):
+        return "recording"
     return "motion" if plain or numbers else "recording"

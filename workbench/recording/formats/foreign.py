@@ -1,8 +1,9 @@
-"""What is no recording that we read: which columns it has, which are wanted, and how to get there."""
+"""Files that are no recordings of a known format: their columns, the required ones, and how to convert them."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,18 +20,20 @@ _UNIT = re.compile(r"(?i)[\s_./]*[\[(]\s*(rad|deg|degrees?|radians?|°|s|sec|sec
                    r"\s*[\])]$|[\s_]+(rad|deg|degrees|radians|counts|ticks|sec|secs|seconds|s|ms)$")
 """What stands after a column's name: its unit, in brackets or after a line."""
 _TIME = re.compile(r"(?i)%?_*(time|timestamp|t|stamp|secs?|seconds?|elapsed)(_?(since|from)_?(start|boot))?(_?stamp)?")
-_GOAL = r"(?:action|actions|command|commanded|cmd|target|goal|desired|reference|setpoint|set_point|ref|des)"
+_GOAL = (r"(?:action|actions|command|commanded|cmd|target|goal|desired|reference|setpoint|set_point|ref|des|input|"
+         r"soll)")
+_JOINT = r"(?:joint[._])?(?:pos(?:ition)?s?[._/ ])?"
 _SEEN = (r"(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|angle|q|meas|motor_position|"
-         r"/?joint_states)")
+         r"/?joint_states|joint_pos|joint_position|joint_positions|pos_estimate|ist)")
 _PLACE = r"(?:[._/](?:pos|position|angle|q))?"
 _NAMED = (
     ("velocity", re.compile(r"(?i)(?:.*/)?(.+?)[._/ ](?:velocity|vel|speed)")),
-    ("goal", re.compile(rf"(?i){_GOAL}[._/ ](?!pos$|position$)(.+?){_PLACE}")),
+    ("goal", re.compile(rf"(?i){_GOAL}[._/ ](?!pos$|position$){_JOINT}(.+?){_PLACE}")),
     ("goal", re.compile(rf"(?i)(.+?)[._/ ](?:{_GOAL}(?:_position|_pos)?|(?:position|pos)_{_GOAL})")),
     ("position", re.compile(rf"(?i){_SEEN}[._/ ](.+?){_PLACE}")),
     ("position", re.compile(r"(?i)(.+?)[._/ ](?:position|pos|present_position|angle|actual|measured|q)")),
 )
-"""Names that other tools give to columns of a joint log: what they hold, and the joint."""
+"""Names that other tools give to columns of a joint log: the quantity, and the joint."""
 _BARE = {"goal": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_GOAL}[._/ ]?(?:pos|position|angle|q)?"),
          "position": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_SEEN}[._/ ]?(?:pos|position|angle|q)?")}
 """Of a log of one servo, whose columns name no joint."""
@@ -48,7 +51,7 @@ class _Column:
 
 
 def refusal(path: Path, head: bytes) -> InputError:
-    """The error that says what a file of no known format is, and what was expected of it."""
+    """The error for a file of no known format, with its apparent kind and the expected one."""
     wanted = ", ".join(f.called for f in known_formats() if f.called)
     if (pointer := lfs_pointer(head)) is not None:
         return InputError(path, pointer)
@@ -74,6 +77,15 @@ def _column(name: str) -> _Column:
     if found is None or found.start() == 0:
         return _Column(name, name, "")
     return _Column(name, name[:found.start()].strip(), (found.group(1) or found.group(2)).lower())
+
+
+def joint_columns(names: Sequence[str]) -> bool:
+    """Whether a table's columns are, by other names, goals and positions of joints, or angles and torques: no motion."""
+    columns = [_column(name) for name in names]
+    if _pairs(columns) or _bare_pair(columns):
+        return True
+    torques = [c for c in columns if re.fullmatch(r"(?i)(.*[._/ ])?(tau|torque|effort)([._/ \[].*)?", c.plain)]
+    return bool(torques) and "time" in names
 
 
 def _hint(columns: list[_Column]) -> str:

@@ -1,4 +1,4 @@
-"""Joint logs (docs/formats.md, section 3): CSV of time, goals and what each servo reported; also as commands of a prediction."""
+"""Joint logs (docs/formats.md, section 3): CSV of time, goals and each servo's readings; also as commands of a prediction."""
 
 from __future__ import annotations
 

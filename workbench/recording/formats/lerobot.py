@@ -1,8 +1,8 @@
 """LeRobot data sets (huggingface/lerobot, versions 2 and 3): parquet files of goals (`action`) and positions
 (`observation.state`).
 
-Positions are degrees, or -100 to 100 of each joint's calibrated range, which the file does not say. What it does show is the
-sensor's count: one of 4096 a turn. Where all steps of a joint are whole multiples of one number, that number is a count, and the
+Positions are degrees, or -100 to 100 of each joint's calibrated range, which the file does not contain. It does show the sensor's
+count: one of 4096 a turn. Where all steps of a joint are whole multiples of one number, that number is a count, and the
 joint's scale is known.
 """
 
@@ -29,7 +29,7 @@ MOST = 512 << 20
 """Largest file [bytes]."""
 _ACTION, _STATE, _TIME, _EPISODE = "action", "observation.state", "timestamp", "episode_index"
 _RATE = 0.05
-"""By how much the rate of time stamps may differ from the one that info.json says, as a share."""
+"""Allowed difference between the rate of time stamps and that in info.json, as a share."""
 _CLEAN = 0.02
 """Of a count: how far it may be from 360/4096 deg for angles in degrees."""
 
@@ -97,8 +97,11 @@ def _table(path: Path) -> pa.Table:
             known = parquet.read_schema(regular_file(file, MOST)).names
             missing = [name for name in (_TIME, _ACTION, _STATE) if name not in known]
             if missing:
+                log = any(name.startswith("goal.") for name in known)
+                how = "; of a joint log in parquet, write CSV: pandas.read_parquet(FILE).to_csv('log.csv', index=False)" if log \
+                    else ""
                 raise InputError(file, f"column '{missing[0]}' is missing (found {', '.join(known[:8])}); expected a LeRobot "
-                                       f"data set with {_TIME}, {_ACTION} and {_STATE}")
+                                       f"data set with {_TIME}, {_ACTION} and {_STATE}{how}")
             parts.append(parquet.read_table(file, columns=[_TIME, _ACTION, _STATE, *([_EPISODE] if _EPISODE in known else [])]))
         except (pa.ArrowException, OSError, ValueError) as e:
             if isinstance(e, InputError):

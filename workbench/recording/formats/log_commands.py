@@ -26,14 +26,14 @@ def out_of_order(time: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class OrderProblem:
-    """row: the first whose time does not follow. text: what is wrong with it."""
+    """row: the first whose time does not follow. text: the problem."""
 
     row: int
     text: str
 
 
 def order_problem(time: Array) -> OrderProblem | None:
-    """What is wrong with times (N,) [any unit] that do not increase; None where they do."""
+    """Problem of times (N,) [any unit] that do not increase; None where they do."""
     bad = np.flatnonzero(out_of_order(time))
     if not len(bad):
         return None
@@ -44,7 +44,7 @@ def order_problem(time: Array) -> OrderProblem | None:
     steps = np.diff(np.unique(known))
     coarse = float(steps.min()) if len(steps) else 0.0
     if len(known) > 2 and np.all(np.diff(known) >= 0) and (coarse >= 1 or (not coarse and known[0] > _EPOCH)):
-        lost = "the same time stands in several rows: its digits were lost when it was written (rounded)"
+        lost = "several rows have the same time: its digits were lost when it was written (rounded)"
         return OrderProblem(row, f"{text}: {lost}; write seconds since the first row, or with all digits")
     return OrderProblem(row, f"{text}; expected increasing times")
 

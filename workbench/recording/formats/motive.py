@@ -36,9 +36,9 @@ _DISAGREE = 0.01  # of header and Time column, which is rounded to a millisecond
 def read_motive(path: str | Path) -> Recording:
     """Reads a Motive CSV (OptiTrack, "Data Export: CSV") in one pass over the file.
 
-    Time is (frame - first frame) / export rate; lengths become metres; quaternions are stored wxyz, as the file has
-    them, sign included; Euler angles (intrinsic, degrees, in the order that the header names) become quaternions; blank cells
-    are NaN. InputError names the line where a file is cut or holds what is no number.
+    Time is (frame - first frame) / export rate; lengths become metres; quaternions are stored wxyz, as in the file,
+    sign included; Euler angles (intrinsic, degrees, in the order that the header names) become quaternions; blank cells
+    are NaN. InputError names the line where a file is cut or contains something other than a number.
     """
     source = str(path)
     mapped, written = table_bytes(path)
@@ -112,7 +112,7 @@ def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, sca
 
 
 def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[str]) -> NDArray[np.int64]:
-    """Frame numbers; a leap of hours is told, and taken as one frame."""
+    """Frame numbers; a leap of hours is reported, and taken as one frame."""
     frames = column(table, 0)
     bad = ~np.isfinite(frames) | (np.abs(frames) > _LARGEST) | (frames != np.round(frames))
     bad[1:] |= ~(np.diff(frames) > 0)
@@ -125,8 +125,8 @@ def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[s
     leaps = steps > max(_LEAP, 100 * len(out))
     if leaps.any():
         k = int(np.argmax(leaps))
-        problems.append(f"line {header.lines + 2 + k}: frame number leaps from {out[k]} to {out[k + 1]}, which no take has; what "
-                        "follows is taken as the next frames")
+        problems.append(f"line {header.lines + 2 + k}: frame number leaps from {out[k]} to {out[k + 1]}, which no take has; the "
+                        "following rows are taken as the next frames")
     steps = np.where(leaps, 1, steps)
     return np.concatenate([out[:1], out[0] + np.cumsum(steps)])
 

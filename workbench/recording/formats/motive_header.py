@@ -1,4 +1,4 @@
-"""The header of a Motive CSV export: what the take says about itself, and what each column holds."""
+"""The header of a Motive CSV export: the take's metadata, and the quantity in each column."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_LINES = 40  # no version has more than eight rows before the data
 
 @dataclass
 class Asset:
-    """Columns of one rigid body, bone or marker, by what they hold: {axis letter: column}."""
+    """Columns of one rigid body, bone or marker, by quantity: {axis letter: column}."""
 
     name: str
     kind: str
@@ -58,7 +58,7 @@ def looks_like_motive(head: bytes) -> bool:
 def parse_header(source: str, content: memoryview) -> MotiveHeader:
     """Reads the rows up to the one that starts with `Frame`, wherever that is; InputError if there is none.
 
-    Columns are told by (type, name, kind, axis), never by their number: versions differ in labels, in a Parent row, in a
+    Columns are identified by (type, name, kind, axis), never by their number: versions differ in labels, in a Parent row, in a
     TimeCode column, and spreadsheets pad rows with empty cells.
     """
     rows: list[list[str]] = []

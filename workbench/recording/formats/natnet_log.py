@@ -34,7 +34,7 @@ def matches(head: bytes) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """InputError that says what it looks like and what is wanted: which body of the robot this is, and when, nothing says."""
+    """InputError with its apparent content and the missing data: the file does not name the robot's body, or the time."""
     from workbench.files.tables import plain_head
 
     cells = _cells(plain_head(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import mmap
+import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from workbench.types import Array
 Bytes = bytes | mmap.mmap
 _BLOCK = 1 << 22
 """Bytes that are read at once; less is sooner read by one thread than given to several."""
+_CLOCK = re.compile(r"\d{4}-\d\d-\d\d|\d\d?:\d\d")
+"""How dates and times of day are written."""
 _BLANK = ["", " ", "NaN", "nan"]
 
 
@@ -98,7 +101,8 @@ def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: i
         for i, cell in enumerate(row):
             if i not in text and cell not in _BLANK and number_of(cell) is None:
                 told = MistypedError if cell.strip().isalpha() else InputError
-                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'")
+                how = " (a date or time of day: write seconds since the first row)" if _CLOCK.search(cell) else ""
+                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'{how}")
     return None
 
 

@@ -18,7 +18,7 @@ _WIDTH = 11
 
 
 def matches(head: bytes) -> bool:
-    """Told by its rows: comments or info first, then `frame` or `rigidbody` rows."""
+    """Recognised by its rows: comments or info first, then `frame` or `rigidbody` rows."""
     if is_binary(head):
         return False
     first = head.lstrip(b"\xef\xbb\xbf").split(b",", 1)[0].strip().lower()

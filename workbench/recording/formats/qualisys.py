@@ -20,7 +20,7 @@ _WIDTH = 16
 
 
 def matches(head: bytes) -> bool:
-    """Told by its first word."""
+    """Recognised by its first word."""
     return not is_binary(head) and head.lstrip(b"\xef\xbb\xbf").startswith(_FIRST)
 
 

@@ -14,8 +14,8 @@ from workbench.recording.servo_log.plausibility import checked
 
 
 def recording_of_take(path: Path, take: str) -> Path:
-    """What `read_recording` is to read for a session's take: `path` itself, a file or a folder of a format, or FILE#PART; of
-    several recordings in one file the one that is called as the take is. InputError says what is missing."""
+    """Path that `read_recording` reads for a session's take: `path` itself, a file or a folder of a format, or FILE#PART; of
+    several recordings in one file the one with the take's name. InputError says which is missing."""
     file, part = split_part(path)
     if not file.exists():
         raise InputError(None, f"file not found: {file}")

@@ -32,10 +32,10 @@ def is_rollout(first_line: str) -> bool:
 
 
 def save_rollout(take: Take, path: str | Path) -> Path:
-    """Writes a take as CSV under three comment lines: format, what the take is (JSON, commands included), units.
+    """Writes a take as CSV under three comment lines: format, description (JSON, commands included), units.
 
     Columns: time, position.J, velocity.J, torque.J of each joint J, base.x … base.qz, contact.FOOT.x … (line 3: units);
-    what the take lacks is left out, a gap is a blank cell. Rigid bodies are not written.
+    quantities that the take lacks are left out, a gap is a blank cell. Rigid bodies are not written.
     """
     columns: dict[str, Array] = {"time": take.time}
     for kind, values, unit in (("position", take.q, _DEG), ("velocity", take.v, _DEG), ("torque", take.torque, 1.0)):
@@ -72,7 +72,7 @@ def load_rollout(path: str | Path) -> Take:
         commands = None if about["commands"] is None else _commands_in(about["commands"])
         problems = tuple(map(str, about["problems"]))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError) as e:
-        raise InputError(path, f"line 2: expected what the take is, as JSON ({type(e).__name__}: {e})") from None
+        raise InputError(path, f"line 2: expected a JSON description of the take ({type(e).__name__}: {e})") from None
     columns = number_columns(path, lines[3], first_line=4, skip_blank=True)
     joints = tuple(c.removeprefix("position.") for c in columns if c.startswith("position."))
     feet = dict.fromkeys(c.split(".")[1] for c in columns if c.startswith("contact."))

@@ -102,7 +102,7 @@ def read_ros_csv(path: Path) -> Recording:
 
 
 def _name(table: pa.Table, names: dict[str, int], key: str) -> str:
-    """A joint's name by its key: that itself, or of an index what stands in the column of names, or joint_1 and so on."""
+    """A joint's name by its key: that itself, or for an index the entry in the column of names, or joint_1 and so on."""
     if not key.isdecimal():
         return key
     if key in names:

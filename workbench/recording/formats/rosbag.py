@@ -27,15 +27,15 @@ _DAMAGED = (OSError, ValueError, KeyError, RuntimeError, IndexError, AssertionEr
 
 
 def matches(head: bytes) -> bool:
-    """Told by its first bytes."""
+    """Recognised by its first bytes."""
     return head.startswith(_BEGINNINGS)
 
 
 def read_rosbag(path: Path) -> Recording:
-    """Reads the joints of which the bag has goals and positions: a controller's state, or joint states with a topic of goals
-    beside (JointState or JointTrajectory); else the poses of bodies (tf, PoseStamped, TransformStamped, Odometry; z up).
+    """Reads the joints of which the bag has goals and positions: a controller's state, or joint states and a separate topic of
+    goals (JointState or JointTrajectory); else the poses of bodies (tf, PoseStamped, TransformStamped, Odometry; z up).
 
-    Times are the messages' own stamps. InputError names the topics where neither is there, and says so where the bag is damaged.
+    Times are the messages' own stamps. InputError lists the topics where neither exists, and reports a damaged bag.
     """
     source = str(path)
     called = None if path.is_dir() else kind_of_file(plain_head(path))
@@ -63,7 +63,7 @@ def read_rosbag(path: Path) -> Recording:
 
 
 class _Found:
-    """What a bag holds, gathered message by message."""
+    """Content of a bag, gathered message by message."""
 
     def __init__(self) -> None:
         self.topics: dict[str, str] = {}
@@ -140,7 +140,7 @@ def _transforms(found: _Found, topic: str, time: float, message: Any) -> None:
 _TAKES = {"JointState": _joint_state, "JointTrajectoryControllerState": _controller_state, "JointTrajectory": _trajectory,
           "PoseStamped": _pose, "PoseWithCovarianceStamped": _pose, "Odometry": _pose, "TransformStamped": _transform,
           "TFMessage": _transforms}
-"""What each type of message gives."""
+"""Reader of each type of message."""
 
 
 def _sorted(samples: list[tuple[float, float]]) -> tuple[Array, Array]:
@@ -162,7 +162,7 @@ def _joint_recording(source: str, found: _Found, joints: list[str]) -> Recording
         channels[f"position.{joint}"] = positions if np.array_equal(seen, time) else np.interp(time, seen, positions)
     started = np.flatnonzero(np.isfinite([channels[f"goal.{j}"] for j in joints]).all(axis=0))
     if len(started) < 2:
-        raise InputError(source, "a rosbag whose goals come after its positions: expected them beside each other")
+        raise InputError(source, "a rosbag whose goals come after its positions: expected them at the same times")
     rows = slice(int(started[0]), None)
     channels = {name: values[rows] for name, values in channels.items()}
     time = time[rows] - time[rows][0]

@@ -26,7 +26,7 @@ from workbench.types import Array
 
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
 MOST_UNPACKED = 256 << 20
-"""Of all arrays in one file [bytes]: hours of an arm's log."""
+"""Largest size of the arrays in one file [bytes]: hours of an arm's log."""
 _DAMAGED = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, AttributeError, NotImplementedError, RuntimeError,
             KeyError, TypeError, OverflowError, MemoryError, SyntaxError, struct.error, tokenize.TokenError)
 """What numpy and zipfile raise on damaged archives."""
@@ -69,7 +69,7 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
 
 
 def _check_size(path: str | Path) -> None:
-    """InputError where what is packed would fill the memory: the archive says how large each array is."""
+    """InputError where the unpacked content would fill the memory: the archive states how large each array is."""
     with zipfile.ZipFile(path) as content:
         total = sum(entry.file_size for entry in content.infolist())
     if total > MOST_UNPACKED:
@@ -86,7 +86,11 @@ def _npz_programme(source: str, fields: dict[str, Array], name: str) -> Recordin
     prefix = f"{name}/" if name else ""
     for field, dimensions in _FIELDS.items():
         array = fields.get(prefix + field)
-        if array is None or array.ndim != dimensions:
+        if array is None:
+            found = ", ".join(list(fields)[:8])
+            raise InputError(source, f"no array '{prefix}{field}' (found {found}); expected a SAGE programme with "
+                                     f"{', '.join(_FIELDS)}, or a table as CSV")
+        if array.ndim != dimensions:
             raise InputError(source, f"'{prefix}{field}': expected an array of {dimensions} dimension(s)")
     width = fields[prefix + "q_meas"].shape[1]
     joints = JOINTS if width == len(JOINTS) else tuple(f"joint_{i + 1}" for i in range(width))

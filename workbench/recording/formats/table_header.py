@@ -29,8 +29,8 @@ class TableHeader:
 
 
 def table_header(content: Bytes) -> TableHeader:
-    """The first line of a table that is neither blank nor a comment (#); of a table below whose comments numbers stand at once,
-    the last comment, as numpy writes its header."""
+    """The first line of a table that is neither blank nor a comment (#); for a table whose comments are followed directly by
+    numbers, the last comment, as numpy writes its header."""
     at = lines = 0
     named: TableHeader | None = None
     while at < len(content) and lines < _MOST:

@@ -1,4 +1,4 @@
-"""TRC tables of markers (Motion Analysis, OpenSim); y up. Rigid bodies are formed of markers whose names begin alike."""
+"""TRC tables of markers (Motion Analysis, OpenSim); y up. Rigid bodies are formed of markers with a common name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FIRST = b"PathFileType"
 
 
 def matches(head: bytes) -> bool:
-    """Told by its first word."""
+    """Recognised by its first word."""
     return not is_binary(head) and head.lstrip(b"\xef\xbb\xbf").startswith(_FIRST)
 
 

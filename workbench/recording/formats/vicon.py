@@ -28,7 +28,7 @@ def matches(head: bytes) -> bool:
 
 def read_vicon(path: Path) -> Recording:
     """Reads the first table of a Vicon export. A rotation of three numbers is a rotation vector, of four (RW) a quaternion;
-    blanks are gaps. InputError names the line of what is no number."""
+    blanks are gaps. InputError names the line of a value that is not a number."""
     source = str(path)
     lines = [split_row(line) for line in plain_text(path).splitlines()]
     head = next((i for i, row in enumerate(lines) if row[:2] == ["Frame", "Sub Frame"]), None)

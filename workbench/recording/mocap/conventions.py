@@ -1,4 +1,5 @@
-"""Axes and lengths of a capture against the robot's own: what an export's settings change without its header saying so."""
+"""Axes and lengths of a capture against the robot's own: changes made by an export's settings that its header does not
+mention."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ PARALLEL = 0.9
 @dataclass(frozen=True)
 class Center:
     """A joint's axis: a point on it from the pivot of the parent's body and from that of the child's, and its direction, all (3,)
-    [m] in that body's frame; covariance (6, 6) of both points, which says nothing along the axis."""
+    [m] in that body's frame; covariance (6, 6) of both points, which does not constrain the axial direction."""
 
     in_parent: Array
     in_child: Array
@@ -45,10 +45,10 @@ class Span:
 
 
 def joint_center(tracks: Tracks, joint: SeenJoint) -> Center | None:
-    """Least squares of a point that both bodies carry round alike, p_P + R_P a = p_C + R_C b in each frame (R. M. Ehrig et al.,
-    A survey of formal methods for determining the centre of rotation of ball joints, J. Biomechanics 39, 2006; about one axis
-    alone it leaves the place along that axis open, where the least squares take what lies nearest to the pivots). None where
-    the parent was not tracked or the joint hardly turned."""
+    """Least squares of a point that is fixed in both bodies, p_P + R_P a = p_C + R_C b in each frame (R. M. Ehrig et al.,
+    A survey of formal methods for determining the centre of rotation of ball joints, J. Biomechanics 39, 2006; for a single axis
+    the position along it is undetermined, and the solution closest to the pivots is used). None where the parent was not
+    tracked or the joint hardly turned."""
     if joint.parent is None:
         return None
     good = tracks.seen[joint.parent] & tracks.seen[joint.child] & ~tracks.mended

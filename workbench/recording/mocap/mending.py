@@ -1,4 +1,4 @@
-"""What goes wrong in motion capture, found and where possible mended: sign flips, exchanged labels, spikes, gaps."""
+"""Errors of motion capture, found and where possible repaired: sign flips, exchanged labels, spikes, gaps."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _ARM = 0.1  # [m] a rotation weighs as much as the way of a point this far off
 
 
 def mend(tracks: Tracks, model: RobotModel | None = None, longest: float = LONGEST_MENDED) -> Tracks:
-    """Poses that were not seen blanked, lengths and axes set right, sign flips undone, exchanged labels put back, lone spikes cut
-    out, gaps up to `longest` [s] filled (positions linearly, rotations by slerp). All is told in `problems`; `model` lets
-    lengths, axes and exchanged labels be judged by the robot's tree."""
+    """Poses that were not seen blanked, lengths and axes corrected, sign flips undone, exchanged labels restored, lone spikes
+    removed, gaps up to `longest` [s] filled (positions linearly, rotations by slerp). Everything is reported in `problems`;
+    `model` allows lengths, axes and exchanged labels to be judged by the robot's tree."""
     tracks = without_unseen(tracks)
     if model is not None:
         tracks = conventional(tracks, model)

@@ -34,9 +34,9 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     """Linear least squares of all pivots together (3 unknowns each), through the kinematic tree.
 
     With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame,
-    which is linear in all pivots. What turns with no joint, above all across the machine, is seen weakly or not at all; there
-    the link's centre of mass decides (a prior of 3 cm), and the sigma says so. The recorded zeros stand for `rest_pose`
-    [rad] and the base's tilt `rest_rotation` (4,).
+    which is linear in all pivots. A pivot that turns with no joint, above all across the machine, is determined weakly or not at
+    all; there the link's centre of mass decides (a prior of 3 cm), and the sigma shows it. The recorded zeros correspond to
+    `rest_pose` [rad] and the base's tilt `rest_rotation` (4,).
     """
     k = model.kinematics
     root = base_row(tracks, model)

@@ -37,10 +37,10 @@ class _Rest:
 
 def register(recording: Recording, model: RobotModel, commands: Commands | None, predicted: Take | None = None,
              starts_at: float | None = None, yaw: float | None = None, base: str = "free") -> Measurement:
-    """How a recording looked at the robot.
+    """How the cameras observed the robot.
 
     predicted: a simulated take of the same commands; if it is not zeroed, the pose and tilt in which it rests are taken as the
-    pose that the recorded zeros mean. Without it the commands through a lag stand in. starts_at [s], yaw [rad]: given
+    pose that the recorded zeros mean. Without it the commands through a lag are used. starts_at [s], yaw [rad]: given
     instead of found (the yaw of a session: `session_yaw`). base: "free" or "fixed". Clock rate 1 and marker frames are taken as
     stated. Logs carry
     their own commands and clock. InputError where a start cannot be found.

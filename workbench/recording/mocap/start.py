@@ -13,7 +13,7 @@ from workbench.recording.take import Take
 from workbench.types import Array
 
 _LAG = 45.0
-"""Natural frequency [rad/s] of the second-order lag that stands in for a servo where nothing was simulated."""
+"""Natural frequency [rad/s] of the second-order lag that replaces a servo where nothing was simulated."""
 _BEFORE, _AFTER = 0.05, 0.25  # [s] window around a joint's first motion
 _FINE = 0.06  # [s] how far a joint may differ from the common start
 _LEAST = np.deg2rad(1.0)  # a joint that moves less in its window says nothing
@@ -25,7 +25,7 @@ _ASTRAY = 0.03  # [s] further from when joints set out, their speeds are not tho
 @dataclass(frozen=True)
 class StartEstimate:
     """time: of the first command on the recording's clock [s]. sigma [s]: of the median, from the spread over joints.
-    by_joint: what each joint alone says [s]."""
+    by_joint: estimate from each joint alone [s]."""
 
     time: float
     sigma: float
@@ -85,8 +85,8 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
 
 
 def _turned(time: Array, q: Array, noise: Array) -> Array:
-    """Where joints q (N, n) stand in the first frames (n,), if that is clearly not zero: a body's marker frame is turned. Zero
-    where they are on their way already, or unseen."""
+    """Angles of joints q (N, n) in the first frames (n,), if clearly not zero: a body's marker frame is turned. Zero
+    where they are moving already, or unseen."""
     first = q[time < time[0] + _STAYS]
     half, out = len(first) // 2, np.zeros(q.shape[1])
     for c in np.flatnonzero(np.isfinite(noise)):
@@ -98,7 +98,7 @@ def _turned(time: Array, q: Array, noise: Array) -> Array:
 
 
 def _onset(t: Array, q: Array) -> float | None:
-    """When the predicted joint first leaves rest, if it then moves enough to be told from noise."""
+    """When the predicted joint first leaves rest, if it then moves enough to be distinguished from noise."""
     away = np.flatnonzero((np.abs(q) > 0.2 * _LEAST) & (t >= 0))
     if not len(away):
         return None

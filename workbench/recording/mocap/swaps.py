@@ -22,8 +22,8 @@ _NEAR = 3  # frames over which a velocity still tells where a body goes
 
 
 def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
-    """Puts back labels that change places. A change is seen where each of two bodies goes on where the other was;
-    the frames between two changes are exchanged back. Of an odd number of changes either the start or the end is wrong:
+    """Restores labels that change places. A change is detected where each of two bodies continues where the other was;
+    the frames between two changes are exchanged back. For an odd number of changes either the start or the end is wrong:
     the robot's tree decides (joints keep their links together), or without a model the start is believed."""
     known = _Seen(tracks)
     step = [known.miss(i, i, known.anywhere) for i in range(len(tracks.assets))]
@@ -38,12 +38,13 @@ def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
         holds = right
         if model is not None and right[-1] != right[0]:
             holds = min((right, reverse), key=lambda h: _torn(_put_back(tracks, starts, h), model))
-        tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_told(tracks, starts, holds)))
+        tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_describe(tracks, starts, holds)))
     return tracks if model is None else _throughout(tracks, model)
 
 
 class _Seen:
-    """Each body's last samples before every frame and its first from there on, so that a gap beside a change does not hide it."""
+    """Each body's last samples before every frame and its first from there on, so that a gap next to a change does not hide
+    it."""
 
     def __init__(self, tracks: Tracks) -> None:
         n = len(tracks.time)
@@ -97,7 +98,7 @@ def _put_back(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Trac
     return replace(tracks, p=p, q=np.stack([quat.continuous(track)[0] for track in q]), mended=mended)
 
 
-def _told(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> list[str]:
+def _describe(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> list[str]:
     """A line for each set of labels that were exchanged, from when to when."""
     n = len(tracks.time)
     spans: dict[tuple[int, ...], list[list[int]]] = {}
@@ -152,7 +153,7 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
     even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # two like legs can be repaired at either joint
     holds = min(even, key=lambda h: _out_of_place(_put_back(tracks, [0], [h]), model))
     fixed = _put_back(tracks, [0], [holds])
-    return replace(fixed, problems=(*tracks.problems, *_told(tracks, [0], [holds])))
+    return replace(fixed, problems=(*tracks.problems, *_describe(tracks, [0], [holds])))
 
 
 def _out_of_place(tracks: Tracks, model: RobotModel) -> float:

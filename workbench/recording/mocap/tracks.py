@@ -108,7 +108,7 @@ def tracks_of(recording: Recording) -> Tracks:
 
 
 def _odd(asset: str, norm: Array, far: NDArray[np.bool_]) -> list[str]:
-    """What is wrong with a body's numbers: quaternions that are not of unit length, places that no capture volume holds."""
+    """Problems of a body's numbers: quaternions that are not of unit length, places that no capture volume contains."""
     out = []
     lengths = norm[np.isfinite(norm) & (norm > 0)]
     off = lengths[np.abs(lengths - 1) > NOT_UNIT]

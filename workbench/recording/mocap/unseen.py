@@ -32,7 +32,7 @@ def without_unseen(tracks: Tracks) -> Tracks:
         if lost.any():
             problems.append(f"{asset}: {int(lost.sum())} frame(s) at the origin without a rotation: lost, not seen")
             p[i, lost], q[i, lost] = np.nan, np.nan
-        held = _held(p[i], q[i])
+        held = _repeats(p[i], q[i])
         if not held.any():
             continue
         p[i, held], q[i, held] = np.nan, np.nan
@@ -60,7 +60,7 @@ def _lost(p: Array, q: Array) -> NDArray[np.bool_]:
     return at if np.all(step[edge] > _APART) else np.zeros(len(p), dtype=bool)
 
 
-def _held(p: Array, q: Array) -> NDArray[np.bool_]:
+def _repeats(p: Array, q: Array) -> NDArray[np.bool_]:
     """(N,) frames that repeat the pose seen before to the last digit, in a body whose poses are noisy."""
     held = np.zeros(len(p), dtype=bool)
     poses = np.hstack([p, q])

@@ -23,8 +23,8 @@ _CLEAR = 0.3
 
 @dataclass(frozen=True)
 class YawEstimate:
-    """yaw [rad], positive to the left, of the model's forward axis in the capture's axes; sigma [rad]; by_joint: what each
-    joint alone would say [rad]."""
+    """yaw [rad], positive to the left, of the model's forward axis in the capture's axes; sigma [rad]; by_joint:
+    estimate from each joint alone [rad]."""
 
     yaw: float
     sigma: float
@@ -125,7 +125,7 @@ def _faces_backwards(takes: Sequence[Tracks], model: RobotModel, commands: Seque
 
 
 def _layout(tracks: Tracks, model: RobotModel, yaw: float) -> float:
-    """Correlation (-1 to 1) of where the bodies stand at first with where the model's links are."""
+    """Correlation (-1 to 1) between the initial positions of the bodies and those of the model's links."""
     k = model.kinematics
     poses = k.forward(np.zeros((1, len(k.joints))))
     found, nominal = [], []

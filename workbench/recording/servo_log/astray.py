@@ -1,4 +1,4 @@
-"""Single readings that lie off a joint's way by less than a leap: what a bus writes when a servo did not answer."""
+"""Single readings that deviate from a joint's path by less than a leap: values that a bus writes when a servo did not answer."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class AstrayChecks:
-    """rows: a reading may be off for so many rows. times: off the line between its neighbours by more than so many times what
-    `share` of the readings nearby are, and `way` of what the joint moves in a row there, and at least `least` [deg]; again: by
-    so many of the steps of the two rows beside it where its value comes several times. near: rows on each side that count.
-    slowest: rows further apart tell nothing [s]. most: share of a log's rows beyond which they are no exception."""
+    """rows: longest deviation. times: least deviation from the line between the neighbours, in multiples of that of `share` of
+    the readings nearby, with `way` of the joint's travel per row there, and at least `least` [deg]; again: least deviation in
+    multiples of the steps of the two neighbouring rows where its value occurs several times. near: rows on each side that count.
+    slowest: rows further apart are not used [s]. most: share of a log's rows beyond which they are no exception."""
 
     rows: int = 2
     times: float = 4.0

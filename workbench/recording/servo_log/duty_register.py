@@ -20,13 +20,13 @@ SCALES = (1, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class RegisterChecks:
-    """When a column is the register, and when its law is told.
+    """When a column is taken for the duty register, and when its law is identified.
 
-    whole: how far from whole numbers its values may be. follows: least correlation of duty, below full, with goal less position.
-    fewest: rows with torque on that tell. start: seconds at the log's begin left out, in which the register is that of before.
-    delays [s], ramps [rad/s], duty: where the fit sets out. error: of a residual [rad of goal] from which it counts less. soft:
-    width of the sign [rad], half a count. sure: share of the ramp below which its standard error has to be, else no goal was fast
-    enough to tell it. missed: median residual [rad of goal] beyond which the law is another.
+    whole: largest distance of its values from whole numbers. follows: least correlation of duty, below full, with goal less
+    position. fewest: least number of rows with torque on. start: seconds left out at the log's beginning, in which the register
+    holds an earlier value. delays [s], ramps [rad/s], duty: initial values of the fit. error: residual [rad of goal] above which
+    it counts less. soft: width of the sign [rad], half a count. sure: share of the ramp below which its standard error has to be,
+    else no goal was fast enough to identify it. missed: median residual [rad of goal] beyond which the law is another.
     """
 
     whole: float = 0.02
@@ -47,7 +47,7 @@ REGISTER = RegisterChecks()
 
 @dataclass(frozen=True)
 class RegisterLaw:
-    """gain: of what each log was thought to have; delay [s]; ramp [rad/s], infinite where no goal was fast enough to tell it;
+    """gain: assumed for each log; delay [s]; ramp [rad/s], infinite where no goal was fast enough to identify it;
     minimum_duty; dead_zone [rad]; missed: median residual [rad of goal]; sd: standard errors by name."""
 
     gain: float

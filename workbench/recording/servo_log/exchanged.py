@@ -1,4 +1,4 @@
-"""Joints whose columns stand for each other: a position that follows another joint's goals, and not its own."""
+"""Joints whose columns are exchanged: a position that follows another joint's goals, and not its own."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -> dic
     """By joint, the joint whose goals its position follows instead of its own."""
     far = {j: log for j, log in logs.items() if min(np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))) >= c.goes}
     out = {}
-    own_shares = {joint: abs(_explained(log, log, c)) for joint, log in far.items()}
+    own_shares = {joint: abs(_explained_share(log, log, c)) for joint, log in far.items()}
     for joint, log in far.items():
         own = own_shares[joint]
         if own > c.neither:
             continue
-        others = {other: _explained(that, log, c) for other, that in far.items() if other != joint}
+        others = {other: _explained_share(that, log, c) for other, that in far.items() if other != joint}
         best = max(others, key=lambda o: abs(others[o]), default=None)
         if best is not None and _better(own, abs(others[best]), c) and (
                 own_shares[best] <= c.neither or _same(far[best], log, c)):
@@ -60,7 +60,7 @@ def _same(one: JointLog, other: JointLog, c: ExchangeChecks) -> bool:
     return bool(np.ptp(position) > 0 and np.corrcoef(position, other.position)[0, 1] > c.same)
 
 
-def _explained(asked: JointLog, moved: JointLog, c: ExchangeChecks) -> float:
+def _explained_share(asked: JointLog, moved: JointLog, c: ExchangeChecks) -> float:
     """Share of a position's variance that a joint's goals give; negative where it goes the other way."""
     each = max(1, len(moved.rows) // c.most)
     time, position = moved.time[::each], moved.position[::each]

@@ -1,4 +1,4 @@
-"""What a servo log gets wrong joint by joint: found, set right where that is certain, left out of the evidence where not."""
+"""Faults of a servo log joint by joint: corrected where that is certain, excluded from the evidence where not."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from workbench.recording.servo_log.zero_shift import zero_shifts
 
 @dataclass(frozen=True)
 class Mended:
-    """recording: with what is certain set right and what is no evidence blanked (NaN). lines: of each joint that has one.
-    no_goals: joints whose goals are none of theirs, of which nothing more is to be said."""
+    """recording: with certain faults corrected and unusable values blanked (NaN). lines: of each joint that has one.
+    no_goals: joints whose goals are not theirs, which are not examined further."""
 
     recording: Recording
     lines: tuple[str, ...]
@@ -74,7 +74,7 @@ def _zeroed(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, l
 
 
 def _released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
-    """Blanks the positions of a joint where it does not depend on its goals, and says so."""
+    """Blanks the positions of a joint where it does not depend on its goals, and reports that."""
     name = f"position.{log.name}"
     out = []
     for first, end in lets_go(log):

@@ -28,7 +28,7 @@ FOLLOW = FollowChecks()
 @dataclass(frozen=True)
 class Followed:
     """position(t) = gain * goal(t - lag) + offset. lag [s], offset [rad]. explained: share of the position's variance that this
-    gives, at most 1; 0 where the goal says nothing of the position, or where its gain is negative."""
+    explains, at most 1; 0 where the goal does not predict the position, or where its gain is negative."""
 
     lag: float
     gain: float
@@ -59,7 +59,7 @@ def joint_logs(r: Recording, c: FollowChecks = FOLLOW) -> dict[str, JointLog]:
         goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")
         if goal is None or position is None or not np.isfinite(goal).any():
             continue
-        goal = _held(goal)
+        goal = _fill_gaps(goal)
         on = np.isfinite(goal) & np.isfinite(position) & (r.channels.get(f"enabled.{joint}", np.ones(len(goal))) != 0)
         rows = np.flatnonzero(on)
         if len(rows) >= c.fewest:
@@ -91,7 +91,7 @@ def followed(time: Array, goal: Array, position: Array, c: FollowChecks = FOLLOW
     return Followed(float(lags[best]), float(gain[best]), offset, float(explained[best]))
 
 
-def _held(goal: Array) -> Array:
+def _fill_gaps(goal: Array) -> Array:
     """Goals (N,) with blanks filled by the last one before, or after."""
     at = np.maximum.accumulate(np.where(np.isfinite(goal), np.arange(len(goal)), -1))
     first = int(np.flatnonzero(np.isfinite(goal))[0])

@@ -1,4 +1,4 @@
-"""Joints that do not do what their goals ask: that never follow, that end at one value, or that stand off by a constant."""
+"""Joints that do not obey their goals: that never follow, that stop at one value, or that differ by a constant."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from workbench.recording.servo_log.response import Response, fitted, shapes
 
 @dataclass(frozen=True)
 class HeldBackChecks:
-    """goes: a goal that moves less tells nothing [deg]. follows: a joint whose goals give less of its variance, or that moves
-    over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint stands at its
+    """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves
+    over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its
     extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
     `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain within `alike` of 1, to
     `explained` of its variance, and with a residual of at most `share` of that distance."""
@@ -62,8 +62,8 @@ def _ends(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:
         rows = sum(b - a for a, b in visits)
         if len(visits) >= c.visits and rows > c.piles * len(there):
             most = np.rad2deg(max(float(np.max(sign * log.goal[a:b])) for a, b in visits)) * sign
-            yield (f"is never {which} {np.rad2deg(value):.4g} deg, where it stands to the last digit {len(visits)} times while "
-                   f"the goal goes on to {most:.4g} deg: a stop, or a sensor or register that is cut off there?")
+            yield (f"is never {which} {np.rad2deg(value):.4g} deg, where it rests to the last digit {len(visits)} times while "
+                   f"the goal continues to {most:.4g} deg: a stop, or a sensor or register that is cut off there?")
 
 
 def _stands_off(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:

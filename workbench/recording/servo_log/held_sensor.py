@@ -1,8 +1,8 @@
-"""A sensor that is refreshed more slowly than it is read: its positions are older than their stamps, by more and less in turn.
+"""A sensor that is refreshed more slowly than it is read: its positions are older than their stamps, by a varying amount.
 
-A servo measures its position every few milliseconds and answers with the last one it has. Where that period is near the log's
-own, the age of what is read goes round: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake.
-Period and phase are told by the log alone: they are those by which positions lie best on a line between their neighbours. """
+A servo measures its position every few milliseconds and answers with the last value. Where that period is close to the log's
+own, the age of the readings cycles: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake.
+Period and phase are estimated from the log alone: positions then lie best on a line between their neighbours. """
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class HeldChecks:
-    """When a sensor is said to be held.
+    """When a sensor is taken to be held.
 
-    shortest, longest: period looked for, in rows; of a shorter one little can be told, of a longer one rows repeat. span: rows
-    of fastest motion that are looked at first. phases: of a period that are tried. drift: of the ages over what is looked at, at
-    most, between two periods that are tried, in periods. left: share of the error of interpolation that is left at most; in 20
+    shortest, longest: period searched, in rows; a shorter one has little effect, with a longer one rows repeat. span: rows
+    of fastest motion that are examined first. phases: of a period that are tried. drift: largest drift of the ages over these
+    rows between two periods that are tried, in periods. left: largest remaining share of the error of interpolation; in 20
     of 24 logs of a servo whose sensor is held it was 0.22 to 0.67, in logs of other servos 0.78 and more. hopeless: share over
-    the first rows beyond which no more is looked at. alike: errors that differ by less are of one pattern of ages, which several
-    periods give: the longest is taken. cut: of a single error [rad], as stick and slip are no line. fewest: rows that tell.
-    counts: by which the joint moves in a row at least, in the 90th percentile.
+    the first rows beyond which the search ends. alike: errors that differ by less belong to one pattern of ages, which several
+    periods share: the longest is taken. cut: limit of a single error [rad], as stick and slip are not linear. fewest: least
+    number of usable rows. counts: least motion of the joint in a row, in the 90th percentile.
     """
 
     shortest: float = 0.5
@@ -53,7 +53,7 @@ class Refresh:
     left: float
 
     def ages(self, time: Array) -> Array:
-        """How old what is read at times (N,) [s] is (N,) [s]."""
+        """Age (N,) [s] of the readings at times (N,) [s]."""
         return np.asarray(np.mod(time - self.phase, self.period))
 
 
@@ -88,8 +88,8 @@ def refresh_of(time: Array, position: Array, c: HeldChecks = HELD) -> Refresh | 
 
 
 def at_their_stamps(time: Array, position: Array, refresh: Refresh) -> Array:
-    """Positions (N,) [rad] at the times (N,) [s] at which they were read, between those at which they were measured; the last
-    ones go on as the two before."""
+    """Positions (N,) [rad] at the times (N,) [s] at which they were read, interpolated between those at which they were measured;
+    the last ones are extrapolated."""
     measured = time - refresh.ages(time)
     known = np.isfinite(position)
     at, first = np.unique(measured[known], return_index=True)
@@ -152,7 +152,7 @@ def _at(t: Array, q: Array, periods: Array, phases: Array, c: HeldChecks) -> Arr
 
 
 def _interpolation(measured: Array, q: Array) -> Array:
-    """By how much positions (N,) measured at times (K, N) miss the line between their neighbours (K, N - 2)."""
+    """Distance of positions (N,) measured at times (K, N) from the line between their neighbours (K, N - 2)."""
     whole = measured[:, 2:] - measured[:, :-2]
     share = np.divide(measured[:, 1:-1] - measured[:, :-2], whole, out=np.zeros_like(whole), where=whole > 0)
     return np.asarray(q[1:-1] - (q[:-2] + share * (q[2:] - q[:-2])))

@@ -1,4 +1,4 @@
-"""Whether a joint comes before its goal: a servo follows, so such goals were logged late, or made from what the joint did."""
+"""Whether a joint precedes its goal: a servo follows, so such goals were logged late, or derived from the motion."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class LeadChecks:
-    """When a joint is said to precede its goal.
+    """When a joint is taken to precede its goal.
 
-    longest: leads and lags looked at [s]; share: of the log, at most, whose ends are then not looked at. rows: a lead is at
-    least so many, as a row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS that
-    the lead leaves of the position, in shares of what the best lag leaves; near 1 for noise, and of a periodic motion, whose
-    leads are lags, too (of 44 logs, 0.6 says nothing of any, 0.75 of one). likeness: share of the position's variance that
-    the lead explains. goes: a joint that moves less tells nothing [deg]. fewest: rows that tell.
+    longest: largest lead or lag tried [s]; share: of the log, at most, whose ends are then not used. rows: least lead, as a
+    row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS of the position with the
+    lead, relative to that with the best lag; near 1 for noise, and for a periodic motion, whose leads are lags, too (of 44 logs,
+    0.6 flags none, 0.75 one). likeness: share of the position's variance that the lead explains. goes: least motion of a joint
+    [deg]. fewest: least number of rows.
     """
 
     longest: float = 0.4
@@ -47,7 +47,7 @@ def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
         lead = _lead(r.time[on], goal[on], position[on], c)
         if lead is not None:
             yield (f"position.{joint}: precedes goal.{joint} by {1e3 * lead:.0f} ms, which no servo does: were the goals logged "
-                   "late, or made from what the joint did?")
+                   "late, or derived from the motion?")
 
 
 def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:
@@ -59,7 +59,7 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
     inside = (time >= time[0] + most) & (time <= time[-1] - most)
     if inside.sum() < c.fewest:
         return None
-    left = np.array([_left(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
+    left = np.array([_unexplained_share(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
     best = int(np.argmin(left))
     ahead = lags <= -c.rows * row
     if not ahead[best] or left[best] > 1 - c.likeness or best == 0:
@@ -67,7 +67,7 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
     return float(-lags[best]) if np.sqrt(left[best]) < c.better * np.sqrt(left[lags >= 0].min()) else None
 
 
-def _left(goal: Array, position: Array) -> float:
+def _unexplained_share(goal: Array, position: Array) -> float:
     """Share of the position's variance that a goal, scaled by a positive number and moved, does not explain."""
     a, b = goal - goal.mean(), position - position.mean()
     total, along = float(b @ b), float(a @ b)

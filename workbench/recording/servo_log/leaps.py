@@ -69,7 +69,7 @@ def _main(position: Array, part: NDArray[np.int_], offset: Array) -> int:
 
 
 class _Said:
-    """What was found, gathered by its kind."""
+    """The findings, by kind."""
 
     def __init__(self, time: Array, position: Array) -> None:
         self.time, self.position = time, position

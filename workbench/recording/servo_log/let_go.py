@@ -14,13 +14,13 @@ from workbench.types import Array, Mask
 
 @dataclass(frozen=True)
 class LetGoChecks:
-    """before: share of the position's variance that the goals give elsewhere, with a gain of at least `firm`; the goals must go
-    to and fro there by `back` of their range, as a way to a stop shows no gain. leaves: the joint is then off its way by more
-    than so many robust standard deviations, and by `least` [deg]. bridges: shorter times on or off the way do not count [s].
-    stands: the joint then moves by so much of what its goals ask, at most. lasts: for so long at least [s]. goes: meanwhile the
-    goals go on by so much [deg], and by `share` of what they do in the whole log. settles: from letting go, and after it holds
-    again, within which its movement does not count [s]. prefixes: shares of the log on which the response is fitted, beside the
-    whole. tight: a stretch begins and ends where the joint is off by so many standard deviations."""
+    """before: share of the position's variance that the goals explain elsewhere, with a gain of at least `firm`; the goals must
+    move back and forth there by `back` of their range, as an approach to a stop shows no gain. leaves: the joint then deviates by
+    more than so many robust standard deviations, and by `least` [deg]. bridges: shorter deviations, or returns, do not count [s].
+    stands: the joint then moves by at most this share of its goals' motion. lasts: for so long at least [s]. goes: meanwhile the
+    goals move by so much [deg], and by `share` of their range in the whole log. settles: after release, and after it holds
+    again, time within which its movement does not count [s]. prefixes: shares of the log on which the response is fitted, besides
+    the whole. tight: a stretch begins and ends where the joint deviates by so many standard deviations."""
 
     before: float = 0.85
     firm: float = 0.5
@@ -82,14 +82,14 @@ def _joined(log: JointLog, stretches: list[tuple[int, int]], fit: Response, c: L
     for first, end in stretches:
         if log.time[end - 1] - log.time[first] < c.bridges:
             continue
-        if out and (log.time[first] - log.time[out[-1][1] - 1] < c.bridges or _stands(log, (out[-1][1], first), fit, c)):
+        if out and (log.time[first] - log.time[out[-1][1] - 1] < c.bridges or _is_at_rest(log, (out[-1][1], first), fit, c)):
             out[-1] = (out[-1][0], end)
         else:
             out.append((first, end))
     return out
 
 
-def _stands(log: JointLog, between: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
+def _is_at_rest(log: JointLog, between: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
     rows = slice(*between)
     asked = float(np.ptp(fit.predicted[rows]))
     return bool(np.rad2deg(asked) > 2 * c.least and np.ptp(log.position[rows]) < c.stands * asked)

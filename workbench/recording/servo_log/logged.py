@@ -1,4 +1,4 @@
-"""How a servo log was logged, found before anything is fitted, and what is made of it."""
+"""How a servo log was logged, found before anything is fitted, and the resulting corrections."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from workbench.recording.servo_log.held_sensor import at_their_stamps, refresh_o
 
 
 def as_logged(r: Recording) -> Recording:
-    """The recording with `notes` that say what was found. Positions of a sensor that is refreshed more slowly than it is read are
-    brought to their stamps."""
+    """The recording with `notes` on the findings. Positions of a sensor that is refreshed more slowly than it is read are
+    interpolated at their stamps."""
     channels, notes = dict(r.channels), list(r.notes)
     for joint in r.joints:
         position = channels.get(f"position.{joint}")

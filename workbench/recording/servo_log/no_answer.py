@@ -1,4 +1,4 @@
-"""Stretches of one value that the joint leaps to and back from: what a bus or a driver writes while a servo does not answer."""
+"""Stretches of one value that the joint leaps to and back from: values that a bus or a driver writes while a servo is silent."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class NoAnswerChecks:
-    """times: the leaps to the value and back are larger than so many times what the joint moves in a row, in all rows but
-    `share`, and larger than `least` [deg]. longest: share of the log that such a value may fill. beside: rows between which it
-    stands. slowest: rows further apart tell nothing [s]. fewest: rows that tell."""
+    """times: the leaps to the value and back are larger than so many times the joint's motion in a row, in all rows but
+    `share`, and larger than `least` [deg]. longest: share of the log that such a value may fill. beside: rows before and after it
+    that are compared. slowest: rows further apart are not used [s]. fewest: least number of rows."""
 
     times: float = 1.5
     share: float = 0.02

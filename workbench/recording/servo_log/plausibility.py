@@ -1,6 +1,6 @@
-"""Whether a servo log can be what it says: turns that no servo makes, units that are not those of the file, sensors that stand.
+"""Whether a servo log is plausible: turns that no servo makes, units that are not those of the file, sensors that freeze.
 
-What is certain is repaired; all is reported, by joint and time.
+Certain errors are repaired; all are reported, by joint and time.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class LogChecks:
     """When a log is doubted.
 
     slow: between rows of a servo's log [s]; more is another unit. fast: rows nearer to each other are read by no bus [s].
-    stands: as long as a position may repeat to the last digit while its goal goes on by `goes` [s, deg], if it then leaps by
-    more than `leaps` of its other steps; a joint that sticks sets out slowly. far: as far as a goal may be from it at the
-    end [deg]. same: share of rows in which goal and position are equal from which the goal is no command; shift: by so many
+    stands: how long a position may repeat to the last digit while its goal moves on by `goes` [s, deg], if it then leaps by
+    more than `leaps` of its other steps; a joint that sticks sets out slowly. far: largest distance of a goal from it at the
+    end [deg]. same: share of rows in which goal and position are equal above which the goal is no command; shift: by so many
     rows at most. pause: between rows, in medians of their steps. longest: a log may last [s]. largest: a number of any channel,
-    beyond what counts of 32 bits come to [SI].
+    beyond the range of counts of 32 bits [SI].
     """
 
     slow: float = 0.5
@@ -52,7 +52,7 @@ CHECKS = LogChecks()
 
 
 def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
-    """The recording with leaps of its positions repaired and `problems` that say so, and whatever else cannot be right;
+    """The recording with leaps of its positions repaired and reported in `problems`, with all other implausible values;
     InputError where a number is beyond all bounds. Only of logs on one clock; cameras' tracks are repaired with the robot in
     view."""
     time = recording.time
@@ -74,7 +74,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     mended = without_faults(read, frozenset(j for j in read.joints if any(
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines
-    problems += _standing(mended.recording, checks)
+    problems += _frozen_sensors(mended.recording, checks)
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
@@ -99,7 +99,7 @@ def beyond_range(recording: Recording, limits: dict[str, tuple[float, float]]) -
         low, high = float(np.nanmin(position)), float(np.nanmax(position))
         if low < lower - np.deg2rad(2) or high > upper + np.deg2rad(2):
             out.append(f"position.{joint}: reaches {np.rad2deg(low):.1f} to {np.rad2deg(high):.1f} deg, beyond the model's range "
-                       f"of {np.rad2deg(lower):.1f} to {np.rad2deg(upper):.1f} deg: the model will stand at its stop")
+                       f"of {np.rad2deg(lower):.1f} to {np.rad2deg(upper):.1f} deg: the model will rest at its stop")
     return tuple(out)
 
 
@@ -135,7 +135,7 @@ def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
         shift = _shift_of_equals(goal, position, c)
         if shift is not None:
             when = "in every row" if not shift else f"of {abs(shift)} row(s) {'before' if shift > 0 else 'later'}, throughout"
-            yield f"goal.{joint}: equals position.{joint} {when}: this log holds no command, only what the joint did"
+            yield f"goal.{joint}: equals position.{joint} {when}: this log holds no command, only the joint's motion"
         elif np.ptp(goal[both]) == 0 and not _comes_to(goal[both][0], position[both]):
             yield (f"goal.{joint}: stays at {np.rad2deg(goal[both][0]):.4g} deg in every row while the joint moves over "
                    f"{far:.3g} deg: was the command recorded?")
@@ -157,7 +157,7 @@ def _comes_to(goal: float, position: Array) -> bool:
     return bool((way[-1] < 0.3 * way.max() or way[-1] < np.deg2rad(5)) and travelled < 3 * np.ptp(position))
 
 
-def _standing(r: Recording, c: LogChecks) -> Iterator[str]:
+def _frozen_sensors(r: Recording, c: LogChecks) -> Iterator[str]:
     for joint, goal, position, on in _commanded(r):
         if _shift_of_equals(goal, position, c) is not None:
             continue

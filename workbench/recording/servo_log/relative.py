@@ -13,13 +13,13 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class RelativeChecks:
-    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal (which then
-    gives `from_place` of its variance). later: rows by which it may come later. explained: share of the way's variance that the
-    goals give. alike: of 1, how far the ratio of the two may be, for steps from row to row; from where the joint is, a servo
-    makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they
-    are angles, if the joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period
-    later. smaller: the goals' range is at most so much of the position's. fewest: rows that tell. added:
-    share of the position's variance that goals added up give to a servo that follows late and smoothed."""
+    """spans: rows over which a joint's travel is compared with the sum of its goals, and from its position with the goal (which
+    then explains `from_place` of its variance). later: rows by which it may come later. explained: share of the travel's variance
+    that the goals explain. alike: tolerance of the ratio of the two around 1, for steps from row to row; from the joint's
+    position, a servo makes `least` to `largest` of it. absolute: share of the position's variance that the goals explain as
+    angles, above which they are angles, if the joint does not move `beyond` times as far; of a swing, its own slope explains as
+    much a quarter of a period later. smaller: the goals' range is at most so much of the position's. fewest: least number of
+    rows. added: share of the position's variance that summed goals explain for a servo that follows late and smoothed."""
 
     spans: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
     later: int = 6

@@ -11,11 +11,11 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class RepeatChecks:
-    """rows: a value has to repeat in so many rows after its own. longest: and in so many at most, else the sensor stood still.
-    counts: of the sensor that the joint moves in each row around, at least; slower joints stick and slip by themselves. catches:
-    the next reading leaps by so much of what it moves in the rows that were repeated. slows: its steps before and after are at
-    least that share of it. around: as many rows on each side, in lengths of the repetition. stretches: so many at least.
-    slowest: rows further apart tell nothing [s]. regular: share of the stretches that have the same length, and of half the log
+    """rows: least number of repetitions after a value. longest: largest number, beyond which the sensor froze.
+    counts: least motion of the joint in each row around [counts of the sensor]; slower joints stick and slip naturally. catches:
+    the next reading leaps by this share of the motion during the repeated rows. slows: its steps before and after are at
+    least that share of it. around: rows on each side, in lengths of the repetition. stretches: least number.
+    slowest: rows further apart are not used [s]. regular: share of the stretches that have the same length, and of half the log
     that they fill, where the sensor is read at a lower rate."""
 
     rows: int = 2

@@ -33,7 +33,7 @@ RESPONSE = ResponseChecks()
 class Response:
     """position = gain * (goal, delayed and smoothed) + offset. predicted: that, at every row (N,) [rad]. offset and spread [rad];
     spread: the robust standard deviation of the residual. explained: share of the position's variance among the rows that are
-    no outliers, at most 1; 0 where the goals say nothing."""
+    no outliers, at most 1; 0 where the goals do not predict the position."""
 
     predicted: Array
     gain: float

@@ -16,8 +16,8 @@ from workbench.types import Array
 @dataclass(frozen=True)
 class StartChecks:
     """changes: of a log's goals that are tried as the motion's first. moves: a goal that changes less does not begin a motion
-    [deg]. ramp: share of the time between goals by which all joints lag where servos ramp them. rows: that a goal stands at
-    least, to tell. follows: share of a position's variance that the lagging goals have to give. joints: that tell, at least."""
+    [deg]. ramp: share of the time between goals by which all joints lag where servos ramp them. rows: least duration of a goal.
+    follows: share of a position's variance that the lagging goals must explain. joints: least number of usable joints."""
 
     changes: int = 60
     moves: float = 0.2
@@ -31,8 +31,8 @@ START = StartChecks()
 
 
 def start_in_log(r: Recording, commands: Commands, c: StartChecks = START) -> float | None:
-    """Time on the log's clock [s] of the first command of a motion, where the log's own goals go with it best; None of a log
-    without goals, or whose goals or motion never change, or that says itself when it began."""
+    """Time on the log's clock [s] of the first command of a motion, by the best fit to the log's own goals; None for a log
+    without goals, or whose goals or motion never change, or that contains its start."""
     sent = r.commands
     if r.sensing != "encoders" or sent is None or "first command" in r.metadata:
         return None

@@ -14,10 +14,10 @@ _FEW_STEPS = 10  # that tell no count
 _ROUNDED = 1e-6
 """Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""
 _CERTAIN = 3.0
-"""Standard errors by which a velocity is told from none."""
+"""Standard errors above which a velocity differs from zero."""
 _SPAN = 0.05
-"""Of positions from which a velocity is told where a log tells none [s]: a servo's rise time. Their parabola is taken, as a first
-goal that is far off makes a servo that stood still as fast in that time as it gets."""
+"""Span of positions from which a velocity is estimated where a log has none [s]: a servo's rise time. Their parabola is used,
+since a first goal that is far away brings a servo at rest to full speed within that time."""
 
 
 def first_command(recording: Recording, starts_at: float | None = None) -> float:
@@ -39,8 +39,8 @@ def staying(values: Array) -> Array:
 
 
 def count_that_stays(values: Array) -> float:
-    """One count of what measured values (N,), told by those that stay for two rows: a log on a clock of its own may hold, where
-    values change, what lies between two counts. NaN where few stay."""
+    """One count of measured values (N,), from those that stay for two rows: a log on a clock of its own may contain interpolated
+    values where they change. NaN where few stay."""
     steps = np.diff(np.unique(staying(values)))
     steps = steps[steps > _ROUNDED]
     return float(steps.min()) if len(steps) >= _FEW_STEPS else float("nan")
@@ -82,8 +82,8 @@ def _at(time: Array, values: Array, when: float) -> float:
 
 
 def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
-    """As logged, else the slope of the first positions where that is more than their noise: a robot that is not seen to move
-    stands still, and one that is stuck in its friction keeps what an error of its start moves it by."""
+    """As logged, else the slope of the first positions where that exceeds their noise: a robot that is not seen to move
+    is at rest, and in one that is stuck in its friction an initial velocity error would move it permanently."""
     speed = recording.channels.get(f"velocity.{joint}")
     if speed is not None and np.isfinite(speed).any():
         return _at(recording.time, speed, time)

@@ -1,6 +1,6 @@
 """Whether the numbers of a servo log can be in the units that its format has: angles, velocities, duty, voltage, signs, zeros.
 
-Each check compares a channel with what a servo can do, with the counts that sensors have, or with another channel of the joint.
+Each check compares a channel with the limits of servos, with the counts of sensors, or with another channel of the joint.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class UnitChecks:
 
     turns: servos of small robots turn less than so many times from their centre. radian_range: a joint that moves, moves less
     than so many degrees only in radians [deg]. fine: steps that no hobby servo's sensor resolves (16384 counts a turn) [deg].
-    moves: a joint that moves less tells nothing [deg]. goes: what has to move so far to be compared with another channel [deg].
+    moves: a joint that moves less is not checked [deg]. goes: least motion for a comparison with another channel [deg].
     far: a joint that never comes nearer to its servo's centre is counted from elsewhere, or in counts [deg]. off: a joint that
-    follows its goal does not stay so far from it [deg]. alike: of a ratio, how far from a unit's it may be. follows:
-    correlation from which one channel follows another, by `lag` at most [s]. volts: more than any servo of a small robot
-    gets [V]. rows: fewer tell nothing.
+    follows its goal does not stay so far from it [deg]. alike: tolerance of a ratio from a unit's. follows:
+    correlation above which one channel follows another, by `lag` at most [s]. volts: above the supply of any servo of a small
+    robot [V]. rows: fewer are not checked.
     """
 
     turns: float = 2.0

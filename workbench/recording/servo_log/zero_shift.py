@@ -14,12 +14,12 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class ShiftChecks:
-    """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the
-    `near` rows on each side. beyond: or so many times what all steps of the log but a hundredth are. alike: how far, in shares
-    of the step, the level of the readings against the goals may differ from it. goal: a goal that steps by that share of it
-    within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart tell nothing [s]. explained: share
-    of the position's variance that the goals have to give. doubt: of two levels, the one nearer to the goals counts as the right
-    one, the first where they are alike to that share."""
+    """least: of a step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from theirs
+    in the `near` rows on each side. beyond: or so many times all steps of the log but a hundredth. alike: largest difference, in
+    shares of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
+    within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart are not used [s]. explained: share
+    of the position's variance that the goals must explain. doubt: of two levels, the one nearer to the goals counts as the right
+    one, the first where they are equally near to that share."""
 
     least: float = 1.0
     times: float = 4.0
@@ -38,7 +38,8 @@ SHIFT = ShiftChecks()
 
 
 def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]]:
-    """What is to be subtracted from the positions of a log (K,) [rad], 0 where its zero is as it was, and a line that says so."""
+    """Correction to subtract from the positions of a log (K,) [rad], 0 where its zero is unchanged, and a line that reports
+    it."""
     none = np.zeros(len(log.rows))
     if float(np.median(np.diff(log.time))) > c.slowest:
         return none, []
@@ -46,7 +47,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
     far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
-    asked = {k for k in inside if _asked(log, k, float(steps[k]) - _usual(steps, k), c)}
+    asked = {k for k in inside if _goal_stepped(log, k, float(steps[k]) - _usual(steps, k), c)}
     at = [k for k in inside if k not in asked and _stands_out(steps, k, c)] or \
         [k for k in inside if k not in asked and _leaps(log, k, abs(float(steps[k]) - _usual(steps, k)), far)]
     if not at:
@@ -77,7 +78,7 @@ def _leaps(log: JointLog, k: int, jump: float, far: float) -> bool:
 
 
 def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:
-    """Whether step `k` differs from those beside it, which are alike, by more than steps differ nearby."""
+    """Whether step `k` differs from its neighbours, which agree, by more than steps differ nearby."""
     bend = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2)  # of step i + 1
     around = np.concatenate([bend[max(k - 2 - c.near, 0):max(k - 2, 0)], bend[k + 1:k + 1 + c.near]])
     jump = abs(steps[k] - _usual(steps, k))
@@ -86,11 +87,11 @@ def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:
 
 
 def _usual(steps: Array, k: int) -> float:
-    """What the joint moves between the rows beside step `k` [rad]."""
+    """Travel of the joint between the rows around step `k` [rad]."""
     return float(steps[k - 1] + steps[k + 1]) / 2
 
 
-def _asked(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
+def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     """Whether a goal stepped the same way shortly before."""
     before = (log.time >= log.time[k] - c.before) & (log.time <= log.time[k + 1])
     goals = np.diff(log.goal[before])

@@ -18,8 +18,8 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
     """An <sdf> of a <robot>, and a line for each change made on the way.
 
     A link's frame lies at the joint that carries it; a joint's pose is its origin in its parent. A link without <inertial>: no
-    mass. A link called as a joint gets "_link" after its name, as SDF's names are of one kind. InputError names what is
-    missing or unknown.
+    mass. A link called as a joint gets "_link" after its name, as SDF's names are of one kind. InputError names missing or
+    unknown elements.
     """
     sdf = Element("sdf", {"version": "1.9"})
     model = SubElement(sdf, "model", {"name": root.get("name") or path.stem})

@@ -31,6 +31,13 @@ _LARGEST, _SMALLEST = 1e12, 1e-300
 _ENDLESS = {"lower", "upper", "effort", "velocity"}
 """Which may be infinite."""
 
+_CONVERTED = {
+    "mujoco": ", a MuJoCo model (MJCF): most publish the URDF that it was made of; else convert it with mjcf2urdf or Drake's "
+              "Parser and write SDF",
+    "COLLADA": ", a mesh (COLLADA): name the robot's URDF or SDF, which names its meshes",
+    "launch": ", a launch file of ROS: name the robot description that it loads"}
+"""What to do about models of other kinds, by their root element."""
+
 
 def read_xml(path: Path) -> Element:
     """The root of a description; InputError where it is no whole XML, too large or nested too deep."""
@@ -54,7 +61,8 @@ def read_xml(path: Path) -> Element:
         raise InputError(path, f"not whole XML in UTF-8, or in the encoding that it says: {e}") from None
     if root is None or root.tag not in ("sdf", "robot"):
         found = "nothing" if root is None else f"<{root.tag[:40]}>"
-        raise InputError(path, f"expected a robot as SDF (<sdf>) or URDF (<robot>), found {found}")
+        how = _CONVERTED.get(root.tag if root is not None else "", "")
+        raise InputError(path, f"expected a robot as SDF (<sdf>) or URDF (<robot>), found {found}{how}")
     if b"xmlns:xacro" in content and any(str(e.tag).startswith("{") and "xacro" in str(e.tag) for e in root.iter()):
         raise InputError(path, "holds xacro macros; expected the URDF that `xacro FILE > robot.urdf` makes of it")
     return root

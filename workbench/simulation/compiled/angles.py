@@ -38,7 +38,7 @@ _readings: OrderedDict[Any, tuple[object, Any]] = OrderedDict()
 
 def servo_angles(jobs: Sequence[Job]) -> list[Array]:
     """Of each job the angles (M, n) [rad] of the servos at its `times`, as their own sensors tell them, NaN outside the run.
-    Jobs of one model share what is made of it. NotCoveredError says why a job has to be Drake's."""
+    Jobs of one model share its arrays. NotCoveredError gives the reason why a job has to be Drake's."""
     machines: dict[Any, CompiledJob] = {}
     out = []
     for job in jobs:
@@ -104,7 +104,7 @@ def _schedule(compiled: CompiledJob) -> Schedule:
 
 
 def _kept(known: OrderedDict[Any, tuple[object, Any]], key: object, of: object, made: Callable[[], Any]) -> Any:
-    """What was made under a key before, or is made now. of: objects whose ids are in the key; held, so that these stay theirs."""
+    """The value under a key, made at the first call. of: objects whose ids are in the key; held, so that these stay theirs."""
     found = known.get(key)
     if found is None:
         found = known[key] = (of, made())

@@ -1,4 +1,4 @@
-"""The compiled station's data: a robot, its schedule and its state as plain arrays, grouped by what they describe.
+"""The compiled station's data: a robot, its schedule and its state as plain arrays, grouped by subject.
 
 n joints turn (servos' and those put between servo and link), m of them are servos', in the model's order. The root R is the base,
 or the world where the base is held. nv = n + 6 velocities: of a free base its w_WB and v_WB, both in W, then the joints', as in
@@ -23,8 +23,8 @@ LINK_CONTACTS = 32
 
 
 class Tree(NamedTuple):
-    """Kinematics, inertia and what acts on joints. parent (n,): body that carries each joint. path (nv,): the velocity before
-    each on the way to the root, -1 at its end; row (nv,): before each of all. group (nv,): the tree of Drake's forest that a
+    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint. path (nv,): the velocity before
+    each on the way to the root, -1 at its end; row (nv,): before each of them. group (nv,): the tree of Drake's forest that a
     velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
     inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
     stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while
@@ -54,14 +54,14 @@ class Tree(NamedTuple):
 
 
 class Servos(NamedTuple):
-    """The law's constants (m,) and what servos do beyond it. joint (m,): number of each. zero (m,) [rad]: of the link.
+    """The law's constants (m,) and servo behaviour beyond it. joint (m,): number of each. zero (m,) [rad]: of the link.
 
     terms: whether there is anything beyond. varies: whether friction does. most (m,): the most friction. ceiling (m,).
     sag (a,): volts lost for each servo at full duty, by term; supply (m,) [V]. fade [1/s]. sticking (b, m), speed (b,):
     friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it
     at rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates.
     lopsided (d, m): shares by which friction is more forwards, by term. derivative [duty per rad/s], ramp [rad/s], lag [s] (m,):
-    of the law. table_servo, table_of (t,): the servo of each torque table, and what it depends on (`workbench.servo.tabled`);
+    of the law. table_servo, table_of (t,): the servo of each torque table, and its argument (`workbench.servo.tabled`);
     table_at, table_torque (t, K): its knots and torques."""
 
     joint: Ints
@@ -103,7 +103,7 @@ class Shapes(NamedTuple):
     farthest point of shape or box. stiffness, dissipation, friction, depth
     (s,): of the pair with the ground; where between ground (0) and shape (1) the contact point is. bodies (b,), middle (b, 3),
     reach (b,): a ball round the shapes of each body that has any. near (k, 2): numbers in `bodies` of those that can touch each
-    other. may_touch (s, s). pair (s, s): row in `pairs` of a sphere (first) and what it touches with a contact that is known, -1
+    other. may_touch (s, s). pair (s, s): row in `pairs` of a sphere (first) and its partner in a contact that is known, -1
     of others; pairs (k, 4): stiffness, dissipation, friction, and where between the other (0) and the sphere (1) the point is."""
 
     body: Ints
@@ -152,7 +152,7 @@ class Schedule(NamedTuple):
 class State(NamedTuple):
     """Changed by a run. base (7,): quaternion wxyz and position of the base in W; q (n,), v (nv,); reference (m,): the ramp;
     goal, reach (m,): of the command, and how far the ramp goes in a step; lagging (m,): the goal behind its filter; on (m,).
-    memory (4, m): velocity, what is known of the load, load and friction of the step before; stepped (1,): 1 where there was
+    memory (4, m): velocity, the known load, load and friction of the step before; stepped (1,): 1 where there was
     one."""
 
     base: Array

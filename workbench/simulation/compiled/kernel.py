@@ -1,4 +1,4 @@
-"""How the compiled station's functions are compiled: by numba, without the GIL, kept on disk under what they were made from.
+"""How the compiled station's functions are compiled: by numba, without the GIL, cached on disk under their sources.
 
 numba asks of a kept function only whether its own file has changed, not those of the functions it calls. So the folder of kept
 code is named after the content of all files that functions and constants come from.

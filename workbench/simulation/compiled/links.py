@@ -21,8 +21,9 @@ ON_SURFACE = 1e-9
 
 @part
 def link_contacts(tree: Tree, shapes: Shapes, state: State, dt: float, count: int, w: Work) -> int:
-    """Adds the contacts between links to `count` of the floor; UNKNOWN where something may touch that this station does not know:
-    other shapes of two links, or the floor by another shape than a sphere. May say so a little too early; never too late."""
+    """Adds the contacts between links to `count` of the floor; UNKNOWN where a contact is possible that this station does not
+    support: other shapes of two links, or the floor by another shape than a sphere. May return it a little too early; never too
+    late."""
     w.crossed[0] = False
     for c in range(shapes.bodies.shape[0]):
         b = shapes.bodies[c]

@@ -31,7 +31,7 @@ class Machine(NamedTuple):
 
 
 def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, dt: float, apart: bool = False) -> Machine:
-    """NotCoveredError says what the arrays cannot hold. apart: contacts between links are not known, and end a run."""
+    """NotCoveredError names the part that the arrays cannot hold. apart: contacts between links are not known, and end a run."""
     missing = [j for j in model.joints if j not in tables.joints]
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")

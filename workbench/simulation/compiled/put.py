@@ -78,7 +78,7 @@ def _turn_back(w: Work, heading: float, x: float, y: float) -> None:
 
 @part
 def put_servos(servos: Servos, schedule: Schedule, k: int, state: State) -> None:
-    """The servos of a held robot to recorded state number k; ramps and what hangs between servos and links go on as they are."""
+    """Moves the servos of a held robot to recorded state number k; ramps, and joints between servos and links, are unchanged."""
     for i in range(servos.joint.shape[0]):
         j = servos.joint[i]
         if not math.isnan(schedule.put_q[k, i]):

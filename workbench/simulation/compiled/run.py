@@ -1,4 +1,4 @@
-"""A run of steps, and what comes before it: the functions that Python calls."""
+"""A run of steps, and its preparation: the functions that Python calls."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float
                 steadied: BaseStates | None, restarts: JointStates | None = None) -> Schedule:
     """lead: in whole steps of the log. commands: as the servos get them, columns in the model's order.
 
-    What comes at or after the end does not come; of two things at one instant the later stays, as in `Simulation`."""
+    Commands and states at or after the end are ignored; of two at one instant the later stays, as in `Simulation`."""
     dt, every = config.time_step, config.logged_every
     end = _on_grid(every, lead + duration)
     at, which = _sent(every, np.zeros(0) if commands is None else lead + commands.times, end)

@@ -164,7 +164,7 @@ def _acting(servos: Servos, i: int, torque: float) -> float:
 
 @part
 def _relief(servos: Servos, i: int, v: float, motor: float, state: State) -> float:
-    """What is taken off the plant's friction, along the motion."""
+    """The reduction of the plant's friction, along the motion."""
     friction = _friction(servos, i, v, motor, state, clamp(v / _MOVING, -1.0, 1.0))
     direction = clamp(v / _MOVING - state.memory[3, i] / max(0.5 * friction, 1e-6), -1.0, 1.0)
     return (servos.most[i] - _friction(servos, i, v, motor, state, direction)) * direction

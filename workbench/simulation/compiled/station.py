@@ -140,7 +140,7 @@ class CompiledJob:
         work = self._work[0]
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
-            self._put(Start(*self.job.start), state)
+            self._set_start(Start(*self.job.start), state)
         log = self._log(rows_of(config, plan.lead + plan.duration))
         self.play(schedule, state, log, work)
         return log
@@ -173,7 +173,7 @@ class CompiledJob:
                      goal=self.physics.zero.copy(), lagging=np.zeros(m), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
                      memory=np.zeros((4, m)), stepped=np.zeros(1))
 
-    def _put(self, start: Start, state: State) -> None:
+    def _set_start(self, start: Start, state: State) -> None:
         """As `Simulation` starts from a given state."""
         servos = np.asarray(start.q, dtype=float)
         if start.logged:

@@ -6,6 +6,7 @@ import hashlib
 from collections import OrderedDict
 from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia, SpatialInertia
@@ -20,11 +21,14 @@ KEPT = 64
 ENDLESS = 1e15
 """Limits that are no smaller [rad] are left to Drake, which takes such for none."""
 _known: OrderedDict[tuple[object, str, bool], tuple[Split | None, Tables]] = OrderedDict()
+_splits: WeakKeyDictionary[SdfRobot, Split] = WeakKeyDictionary()
+_filled: WeakKeyDictionary[Split, tuple[Tables, Tables]] = WeakKeyDictionary()
 
 
 def tables_of(model: RobotModel, build: SdfRobot | None, free: bool) -> Tables:
-    """Of a changed SDF (None: of the model's file) on a free or held base; NotCoveredError says what is not known."""
-    parts = None if build is None else split(build.root)
+    """Of a changed SDF (None: of the model's file) on a free or held base; NotCoveredError names the part that
+    is not supported."""
+    parts = None if build is None else _parts(build)
     key = (hashlib.sha256(model.path.read_bytes()).digest() if parts is None else parts.structure, f"{model.path} {model.base}",
            free)
     if key not in _known:
@@ -33,10 +37,22 @@ def tables_of(model: RobotModel, build: SdfRobot | None, free: bool) -> Tables:
     while len(_known) > KEPT:
         _known.popitem(last=False)
     first, tables = _known[key]
-    if parts is None or first is None or parts == first:
+    if parts is None or first is None or parts.says_the_same(first):
         return tables
-    written = _written(tables, first, parts)
-    return read_tables(model, build.text(), free) if written is None and build is not None else written or tables
+    if parts not in _filled or _filled[parts][0] is not tables:
+        written = _written(tables, first, parts)
+        if written is None:
+            assert build is not None
+            written = read_tables(model, build.text(), free)
+        _filled[parts] = (tables, written)
+    return _filled[parts][1]
+
+
+def _parts(build: SdfRobot) -> Split:
+    """Of a changed SDF; once for each."""
+    if build not in _splits:
+        _splits[build] = split(build.root)
+    return _splits[build]
 
 
 def _written(tables: Tables, first: Split, parts: Split) -> Tables | None:

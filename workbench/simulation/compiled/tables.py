@@ -36,7 +36,7 @@ class NotCoveredError(Exception):
 @dataclass(frozen=True)
 class ShapeTable:
     """Collision shapes as in `arrays.Shapes`, with the materials of their own: link, stiffness, dissipation and friction, None
-    where the description says nothing."""
+    where the description has none."""
 
     body: Ints
     p: Array
@@ -64,9 +64,9 @@ class LinkWeight:
 
 @dataclass(frozen=True)
 class Tables:
-    """What does not depend on servos, floor and step. joints: names, as the arrays number them. tree: as the description has it,
-    without servos' friction, gravity and pull. X_WBase: pose of a fixed base link in W. links: what they weigh. derived: what
-    others have worked out from these and keep."""
+    """The robot apart from servos, floor and step. joints: names, as the arrays number them. tree: as the description has it,
+    without servos' friction, gravity and pull. X_WBase: pose of a fixed base link in W. links: their inertias. derived: results
+    that other modules compute from these tables and keep."""
 
     joints: tuple[str, ...]
     tree: Tree
@@ -77,7 +77,7 @@ class Tables:
 
 
 def read_tables(model: RobotModel, description: str | None, free: bool) -> Tables:
-    """Of a description (SDF text; None: the model's file) on a free or held base; NotCoveredError says what is not known."""
+    """Of a description (SDF text; None: the model's file) on a free or held base; NotCoveredError names the unsupported part."""
     builder = RobotDiagramBuilder(time_step=1e-3)
     plant, parser = builder.plant(), builder.parser()
     ConfigureParser(parser)
@@ -95,7 +95,7 @@ def read_tables(model: RobotModel, description: str | None, free: bool) -> Table
 
 
 def _without_visuals(text: str) -> str:
-    """The SDF without what is only looked at, whose meshes take long to load."""
+    """The SDF without its visuals, whose meshes take long to load."""
     tree = ElementTree.fromstring(text)
     for link in tree.iter("link"):
         for visual in link.findall("visual"):

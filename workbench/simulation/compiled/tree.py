@@ -15,7 +15,7 @@ from workbench.simulation.compiled.vectors import cross, quat_of, turned, write_
 
 @part
 def place_bodies(tree: Tree, state: State, w: Work) -> None:
-    """Rotations R and origins p of all bodies, from the root's origin, in W."""
+    """Rotations R and origins p of the bodies, from the root's origin, in W."""
     n = tree.parent.shape[0]
     if tree.free:
         write_rotation(quat_of(state.base), w.R[n])

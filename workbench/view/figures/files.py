@@ -47,10 +47,9 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
 
 
 def _settle(figure: Figure) -> None:
-    """Lays the figure out once and for all; the layout engine would move things a little at each drawing."""
+    """Lays the figure out once; the layout engine would do so again at each drawing, and move axes by a tenth of a pixel."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        engine.execute(figure)
         engine.execute(figure)
         figure.set_layout_engine("none")
 

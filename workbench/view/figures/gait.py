@@ -1,4 +1,4 @@
-"""A certified gait as figures: how near each limit is, and how it goes on random variants of the robot."""
+"""A certified gait as figures: the margin of each limit, and its performance on random variants of the robot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def limit_bars(certificate: Certificate) -> Figure:
 
 
 def short(value: float) -> str:
-    """Three digits; what is far below any limit's precision is 0."""
+    """Three digits; a value far below any limit's precision is 0."""
     return "0" if abs(value) < 1e-3 else f"{value:.3g}"
 
 

@@ -1,4 +1,4 @@
-"""Where and when a recording leaves the model, before and after what was found is added to it."""
+"""Where and when a recording differs from the model, before and after the findings are added to it."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _DEGREES = 180 / np.pi
 
 @styled
 def gap_map(take: TakeReport) -> Figure:
-    """Places over time: residual over what noise and numerics alone make, RMS in cells of BIN, before and (if it differs) after.
+    """Places over time: residual over noise and numerical error, RMS in cells of BIN, before and (if it differs) after.
 
-    Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks what no choice and no parameter saw."""
+    Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks held-out frames."""
     time, edges = take.time, np.arange(0.0, max(take.time[-1], BIN) + BIN, BIN)
     rows = len(take.channels)
     figure = new_figure(12, 0.21 * rows + 1.5)
@@ -99,8 +99,8 @@ def _oblique(p: Array) -> tuple[float, float]:
 
 @styled
 def before_after(take: TakeReport, joint: str) -> Figure:
-    """A joint as recorded, as the nominal and as the fitted model have it, and what each leaves, around the stretch that no
-    choice saw on which the nominal model misses most."""
+    """A joint as recorded, and by the nominal and the fitted model, with the residuals of each, around the held-out stretch on
+    which the nominal model is worst."""
     low, high = _worst_stretch(take, joint)
     t = take.time
     use = (t >= low) & (t <= high)
@@ -121,7 +121,7 @@ def before_after(take: TakeReport, joint: str) -> Figure:
         _shade(axes, take, low, high)
     top.set_title(f"{take.name}: joint {joint}")
     top.set_ylabel("angle [deg]")
-    strip.set_ylabel("left over [deg]")
+    strip.set_ylabel("residual [deg]")
     strip.set_xlabel("time since the first command [s]; grey: no choice and no parameter saw it; green: noise and numerics, 2σ")
     strip.set_xlim(low, high)
     legend_above(top)

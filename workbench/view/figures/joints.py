@@ -41,7 +41,7 @@ def joint_overlay(
 
     noise, floor: standard deviation of the measurement and numerical floor of the simulation [rad], drawn as a band about
     zero error. stance: by joint (`by_joint`), of the recorded robot, or of the simulated one alone; shades the time in which
-    the joint's foot stands. span: seconds since the first command to show; else what the takes share.
+    the joint's foot is on the ground. span: seconds since the first command to show; else the time common to the takes.
     """
     simulated = _zeroed_like(simulated, recorded)
     figure = new_figure(10, 5.2 if recorded is not None else 4.0)

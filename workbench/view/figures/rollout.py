@@ -1,4 +1,4 @@
-"""What one simulated take did, as figures."""
+"""One simulated take, as figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the servos had to give, what they can, and what no contact explains."""
+"""Load of the servos, their limits, and the wrench that no contact explains."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def joint_torques(
 
 @styled
 def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array, v: Array) -> Figure:
-    """What the motion asks of each servo. Left: motor torque over joint speed of all samples, inside what the servo can
-    give at its supply voltage. Right: the largest share of it that each joint uses, and of the no-load speed.
+    """The load of each servo. Left: motor torque over joint speed of each sample, inside the servo's limits at its supply
+    voltage. Right: the largest share of its torque that each joint uses, and of the no-load speed.
 
-    motor_torque: (N, n) [N m], what motor and gear must give, with reflected inertia and friction. v: (N, n) [rad/s].
+    motor_torque: (N, n) [N m] of motor and gear, with reflected inertia and friction. v: (N, n) [rad/s].
     """
     figure = new_figure(12, 0.27 * len(joints) + 2.0)
     plane, bars = figure.subplots(1, 2, width_ratios=[1.2, 1])
@@ -85,7 +85,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
             label.set(color=RECORDED, fontweight="bold")
     bars.invert_yaxis()
     bars.grid(False, axis="y")
-    bars.set_xlabel("largest share of what the servo can [%]")
+    bars.set_xlabel("largest share of the servo's limit [%]")
     figure.legend(*_joined(plane, bars), loc="outside lower center", ncols=4)
     return figure
 
@@ -97,7 +97,7 @@ def base_wrench(
     """The wrench on the base that the motion needs and no contact inside the friction cone supplies.
 
     time: (N,) [s] on the take's clock. residual: (N, 6) [moment about the base's origin N m, force N] in the world.
-    sigma: (N, 6), what the measurement's noise makes of it, drawn as ±2σ. weight: of the robot [N], for scale.
+    sigma: (N, 6), its standard deviation from the measurement's noise, drawn as ±2σ. weight: of the robot [N], for scale.
     """
     figure = new_figure(10, 5.4)
     rows = figure.subplots(2, 1, sharex=True)

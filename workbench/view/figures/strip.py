@@ -15,7 +15,7 @@ from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, name
 from workbench.view.shapes import robot_shapes
 
 WIDEST = 2.5
-"""Most that a picture reaches, by how far the simulated robot itself does."""
+"""Limit of the pictured distance, relative to that of the simulated robot."""
 
 
 @styled
@@ -33,7 +33,7 @@ def film_strip(
     films = [(played, SIMULATED, names[0], 1.0)]
     if recorded is not None:
         films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
-    shapes, left = robot_shapes(model), _left(model)
+    shapes, left = robot_shapes(model), _links_on_the_left(model)
     own, *others = (_farthest(film, shapes.feet, played) for film, *_ in reversed(films))
     reach = max(80 * shapes.height, 2 + 100 * min(max(own, *others, 0.0), WIDEST * own))
     figure = new_figure(12, 2.9)
@@ -71,7 +71,7 @@ def _farthest(film: Playback, feet: dict[str, tuple[str, Array]], played: Playba
     return float(np.nanmax(np.abs(np.array(x)[:, 1:] - played.base_p[None, 1:, 0])))
 
 
-def _left(model: RobotModel) -> set[str]:
+def _links_on_the_left(model: RobotModel) -> set[str]:
     """Links that lie to the left of the base in neutral, by more than a centimetre."""
     k = model.kinematics
     neutral = k.forward(np.zeros((1, len(model.joints))), model.joints)

@@ -1,4 +1,4 @@
-"""The page of a comparison: what differs, by how much more than noise and numerics, and where to look."""
+"""The page of a comparison: the differences, their size over noise and numerical error, and where to look."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ SHOWN = 3
 
 def write_comparison(comparison: Comparison, model: RobotModel, folder: Path, title: str,
                      progress: Callable[[str, float | None], None]) -> list[Path]:
-    """Writes comparison.json, replay-TAKE.html for each take and report.html, which holds all of it; returns their paths.
+    """Writes comparison.json, replay-TAKE.html for each take and report.html, which contains everything; returns their paths.
 
-    progress: called with what is being made and the share done.
+    progress: called with the current file and the share done.
     """
     paths = [comparison.save(folder / "comparison.json")]
     report = Report(title, headline(comparison), _summary(comparison), _key_numbers(comparison), _provenance(comparison, model))
@@ -50,13 +50,13 @@ def write_comparison(comparison: Comparison, model: RobotModel, folder: Path, ti
 
 
 def headline(comparison: Comparison) -> str:
-    """The page's first sentence: which joints differ by more than noise and numerics make."""
+    """The page's first sentence: which joints differ by more than noise and numerical error."""
     over = [(t, j, c) for t in comparison.takes for j, c in t.joints.items() if c.over_noise > LIMIT]
     if not over:
         return f"Every joint's error is within {LIMIT:g} times what noise and numerics make."
     take, joint, worst = max(over, key=lambda found: found[2].over_noise)
     joints = len({j for _, j, _ in over})
-    return (f"{_count(joints, 'joint')} differ{'s' if joints == 1 else ''} by more than noise and numerics make; most of all "
+    return (f"{_count(joints, 'joint')} differ{'s' if joints == 1 else ''} by more than noise and numerical error; the worst is "
             f"{joint} in {take.name}: {_degrees(worst.error)} RMS, {worst.over_noise:.1f} times both.")
 
 
@@ -100,8 +100,8 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         c = take.joints[joint]
         if k and not c.over_noise > LIMIT:
             break
-        figure = joint_overlay(joint, take.simulated, take.recorded, noise=_known(c.noise), floor=_known(c.floor),
-                               stance=by_joint(recorded, model))
+        figure = joint_overlay(joint, take.simulated, take.recorded, noise=_finite_or_none(c.noise),
+                               floor=_finite_or_none(c.floor), stance=by_joint(recorded, model))
         parts.append(Picture(figure, _about(joint, c)))
     noise = {j: c.noise for j, c in take.joints.items()}
     parts.append(Details("All joints", [
@@ -160,7 +160,7 @@ def _count(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 

@@ -48,8 +48,8 @@ PATH = 0.03
 
 def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: Path, title: str,
                     progress: Progress = lambda what, done: None) -> list[Path]:
-    """Writes findings.json, model.yaml, nominal.yaml, replay-TAKE.html for each take, and report.html, which holds all of it;
-    returns their paths. takes: the takes behind the diagnosis; progress: called with what is being made and the share done."""
+    """Writes findings.json, model.yaml, nominal.yaml, replay-TAKE.html for each take, and report.html, which contains everything;
+    returns their paths. takes: the takes behind the diagnosis; progress: called with the current file and the share done."""
     paths = diagnosis.save(folder)
     report = diagnosis_report(diagnosis, takes, title)
     replays: list[Part] = []
@@ -66,7 +66,7 @@ def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: P
 
 
 def _errors(take: TakeReport) -> list[Errors]:
-    """What the replay shows on the robot: the map of the nominal model, and on demand that of the fitted one."""
+    """Legend of the replay's error map: that of the nominal model, and on demand that of the fitted one."""
     out = [Errors("error against the nominal model", take.time, take.channels, take.before)]
     if not np.array_equal(take.before, take.after, equal_nan=True):
         out.append(Errors("error against the fitted model", take.time, take.channels, take.after, shown=False))
@@ -79,7 +79,7 @@ def _replay_caption(take: TakeReport, errors: Sequence[Errors]) -> str:
             f"large and dark at {DARKEST:g} times, grey where it was not seen.")
     if any(c in BODY for c in take.channels):
         said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
-    return said + (" Tick the fitted model's to see what is left." if len(errors) > 1 else "")
+    return said + (" Tick the fitted model's to see the residuals." if len(errors) > 1 else "")
 
 
 def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: str) -> Report:
@@ -103,7 +103,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
         report.add(recalibrated_section(diagnosis.recalibrated))
     if takes:
         report.add(_unseen(takes))
-    report.add(_left(diagnosis))
+    report.add(_residuals_section(diagnosis))
     others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
         report.add(Section("What else was tried", tried(others, "more that were tried")))
@@ -121,8 +121,8 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
                     "contact model make alone.")
     if any(c in BODY for s in takes for c in s.channels):
         what.append(
-            "Walking is chaotic: for evaluation, a simulated walk is put back beside the recorded one every "
-            f"{PROBLEM.window:g} s; paths and 3D show it left to itself."
+            "Walking is chaotic: for evaluation, a simulated walk is reset to the recorded base every "
+            f"{PROBLEM.window:g} s; paths and 3D show it without these resets."
         )
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
@@ -172,13 +172,13 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
             said = f"The recordings differ from the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
         else:
             said = "Nowhere do the recordings differ from the nominal model by more than chance" + (
-                "; the table shows what comes nearest." if diagnosis.gap else ".")
+                "; the table shows the closest candidates." if diagnosis.gap else ".")
         parts.append(Text(said))
         at_joints: dict[str, float] = {}
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
         parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
-                             "Each joint, by how far it is from the nominal model; one wrong joint moves others."))
+                             "Error of each joint with the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
@@ -193,7 +193,7 @@ def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no selection saw. Grey: not seen")
     if any(c in BODY for c in take.channels):
-        said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
+        said += f", or the model's base had just been reset to the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
 
@@ -229,11 +229,11 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
     if shown is not None:
         i, joint = shown
         drawn.add(shown)
-        parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: what the robot did, and what each "
-                                                              "model says it does."))
+        parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: recorded, and predicted by each "
+                                                              "model."))
     instead = [r for r in rejected if rivals(r, finding)]
     if instead:
-        parts.append(Text("Tried in its place, and rejected:"))
+        parts.append(Text("Alternatives that were tried and rejected:"))
         parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
@@ -261,7 +261,7 @@ def _unseen(takes: Sequence[TakeReport]) -> Section:
     parts: list[Part] = [Picture(unseen_errors(takes), f"Afterwards still beyond {LIMIT:g} times noise and numerics: {said}."
                                  if said else f"Afterwards all is within {LIMIT:g} times noise and numerics.")]
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
-                      f"{s.name}: the body's path as measured, and simulated with what was found and without (nominal).")
+                      f"{s.name}: the body's path as measured, and simulated with and without (nominal) the findings.")
               for s in takes if _walks(s)]
     return Section("Before and after, on unseen stretches", parts)
 
@@ -272,15 +272,15 @@ def _walks(take: TakeReport) -> bool:
     return take.recorded.base == "free" and p is not None and bool(np.nanmax(np.ptp(p[np.isfinite(p[:, 0]), :2], axis=0)) > PATH)
 
 
-def _left(diagnosis: Diagnosis) -> Section:
+def _residuals_section(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
         nothing = diagnosis.verdict in ("no_gap", "explained")
         return Section("Residuals", [Text("No residual above noise and numerical error." if nothing else
-                                             "What is still beyond the green band above is not explained yet.")])
+                                             "Errors that still exceed the green band above are unexplained.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
-    header = ["what is still off", "take", "by", "over noise", "and it varies"]
+    header = ["remaining error", "take", "size", "over noise", "correlation"]
     off = [left_row(u) for u in order if is_error(u)]
-    still = [Text("On unseen stretches the fitted model is still off by more than noise and numerics make (1×). No "
+    still = [Text("On unseen stretches the fitted model still exceeds noise and numerical error (1×). No "
                   "effect that was tried explains it."), *folded(header, off, "more")] if off else []
     return Section("Residuals", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 

@@ -12,8 +12,8 @@ from workbench.dynamics.margins import ServoLoad
 from workbench.robot import GRAVITY, RobotModel
 from workbench.view.figures import base_wrench, joint_torques, servo_margins
 
-_MEASURED = ("sd: what the measurement's noise makes of angles that are differentiated twice; smoothing, and how feet share the "
-             "load, are not in it. A robot that did more than the servo has, has another servo or load than the model.")
+_MEASURED = ("sd: from the measurement's noise in angles that are differentiated twice; smoothing, and the distribution of load "
+             "between feet, are not included. A robot that exceeds its servos' limits has other servos or loads than the model.")
 
 
 def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[str, Figure]:

@@ -1,5 +1,5 @@
-"""The page of an optimised gait: what it does, how near its limits are, what other robots make of it, in 3D beside the ROBOTIS
-walk."""
+"""The page of an optimised gait: its performance, the margin of each limit, its results on other robots, and the gait in 3D with
+the ROBOTIS walk."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PAGE = "report.html"
 
 
 def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
-    """Writes report.html, and replay.html beside it: the gait solid, the ROBOTIS walk as its ghost, where the robot can play
+    """Writes report.html, and replay.html next to it: the gait solid, the ROBOTIS walk as its ghost, if the robot can play
     that."""
     assert result.certified is not None
     assert result.table is not None
@@ -164,7 +164,7 @@ def _draws_section(certificate: Certificate) -> Section:
     parts: list[Part] = []
     if d.get("count"):
         incidents = [[str(i["draw"]), i["robot"], i["what"]] for i in d["incidents"]]
-        parts += [Text(f"{d['count']} robots drawn anew, none of which the search saw: friction, supply and its sag, masses, a "
+        parts += [Text(f"{d['count']} new random robots, none of which the search used: friction, supply and its sag, masses, a "
                        f"load, zero offsets, play and latency all at once. {d['falls'] or 'None'} fell; the true share is below "
                        f"{100 * d['falls at most']:.1f} % (at 95 %)."),
                   *([Table(["draw", "robot", "what happened"], incidents)] if incidents else []),
@@ -182,7 +182,7 @@ def _draws_section(certificate: Certificate) -> Section:
     e = certificate.other_engine
     parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
                       f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
-                      "No second engine played it: what is said here is one engine's word."))
+                      "Not cross-checked: no second simulator is installed."))
     if e:
         parts.append(Table(["condition", f"speed [{n.unit}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
                            [[k, *(f"{c[key]:.3f}" for key in ("speed", "speed elsewhere")),
@@ -226,8 +226,8 @@ def _table_section(table: GaitTable) -> Section:
     numbers = {k: v for k, v in vars(table.shape).items() if k != "offsets"}
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in numbers.items())
     return Section("The table", [
-        Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that "
-             "file, and all but the first ask for `certificate.json` beside it."),
+        Text("The loop; `gait.csv` also contains start and stop. `simulate`, `run`, `play`, `flash` and `export` accept that "
+             "file, and all but the first require `certificate.json` in the same folder."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 

@@ -32,7 +32,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     rows = [(f.effect, " ".join(f.where) or "the robot", f"{f.together:.2f}", f.evidence,
              f"{f.validation.before:.3g} to {f.validation.after:.3g} {f.validation.unit}") for f in diagnosis.findings]
     said = f"Verdict: {diagnosis.verdict.replace('_', ' ')}." + ("" if rows else " Nothing was found.")
-    table = _table(("effect", "where", "confidence", "what it is", "error on unseen stretches"), rows) if rows else ""
+    table = _table(("effect", "where", "confidence", "description", "error on unseen stretches"), rows) if rows else ""
     return _paragraph(said) + table
 
 
@@ -43,7 +43,7 @@ def gait_html(result: Optimized) -> str:
 
 
 def prediction_html(takes: Sequence[Take], paths: Sequence[Path], left_out: Sequence[tuple[str, str]]) -> str:
-    """A row for each predicted take, and what was left out. takes and paths: alike in number and order."""
+    """A row for each predicted take, and for each that was left out. takes and paths: in the same order."""
     rows = [(take.name, f"{take.since_start[-1]:.2f} s", _distance(take), str(path)) for take, path in zip(takes, paths)]
     said = "".join(_paragraph(f"Left out: {name}: {reason}") for name, reason in left_out)
     return _table(("take", "length", "distance", "file"), rows) + said

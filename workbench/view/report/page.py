@@ -23,7 +23,7 @@ from workbench.view.figures import encode
 @dataclass(frozen=True)
 class Text:
     """A paragraph for each blank-line-separated part; `code`, **bold** and [words](file.ext), a link to a
-    file beside the page, are understood, nothing else."""
+    file in the page's folder, are supported, nothing else."""
 
     text: str
 

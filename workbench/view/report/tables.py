@@ -1,4 +1,4 @@
-"""Tables of a diagnosis: what was tried and rejected, and rows that are folded away."""
+"""Tables of a diagnosis: rejected candidates, and rows that are folded away."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
 
 
 def _unlikely(r: Rejected) -> float:
-    """The nearer to what was found, the earlier; what was judged otherwise keeps its order after that."""
+    """By closeness to the finding; those judged by another criterion follow in their order."""
     return r.reason.behind if isinstance(r.reason, LessLikely) else math.inf
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis says, in words and numbers that a person reads at once."""
+"""A diagnosis in words and numbers that a person understands at once."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from workbench.robot import EffectSpec
 NAMED = 0.1
 """A rival this probable is named wherever the finding is."""
 LAYERS: dict[Layer, str] = {
-    "timing": "when commands arrive", "actuator": "what the servos do", "structure": "how links sit on their joints",
-    "inertia": "where the mass is", "ground": "what the floor does", "measurement": "how it was measured"}
+    "timing": "when commands arrive", "actuator": "how servos act", "structure": "how links sit on their joints",
+    "inertia": "where the mass is", "ground": "how the floor acts", "measurement": "how it was measured"}
 _BODY = {"forward": "how far the body goes", "left": "how far the body drifts to the left", "heading": "the body's heading",
          "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
 _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
@@ -33,13 +33,13 @@ def headline(diagnosis: Diagnosis) -> str:
         case "explained":
             return f"{explain} all that the model missed."
         case "partly_explained" if not likely:
-            return f"Nothing that the workbench knows is likely to be what the model missed; nearest comes {names}."
+            return f"No known effect is a likely explanation of the model's error; the closest candidate is {names}."
         case "partly_explained":
             sure = "" if len(likely) == len(diagnosis.findings) else " with certainty"
-            return f"{explain} part of what the model missed; the rest is not identified{sure} yet."
+            return f"{explain} part of the model's error; the rest is not identified{sure} yet."
         case "unexplained" if diagnosis.unknown_torques:
             where = listed([u.joint for u in diagnosis.unknown_torques])
-            return f"A torque at {where} that no known effect describes explains at least part of what the model missed."
+            return f"A torque at {where} that no known effect describes explains at least part of the model's error."
         case "unexplained":
             return "The recordings differ from the model, and no effect that the workbench knows explains how."
 
@@ -60,7 +60,7 @@ def rival_of(finding: Finding) -> Alternative | None:
 
 
 def this_or(tie: Alternative) -> str:
-    """What a tie's confidence is of: `that it is this or joint compliance at flm`."""
+    """Object of a tie's confidence: `that it is this or joint compliance at flm`."""
     return f"that it is this or {title_of(tie.effect, tie.where)}"
 
 
@@ -81,7 +81,7 @@ def in_words(statement: Statement) -> str:
 
 
 def sentence_of(finding: Finding) -> str:
-    """What is different about this robot, as the effect itself says it."""
+    """How this robot differs from nominal, in the effect's own words."""
     numbers = {name: e.value for name, e in finding.parameters.items()}
     said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
     others = listed(finding.where[1:], "or")
@@ -96,7 +96,7 @@ def interval(estimate: Estimate) -> str:
 
 
 def intervals_of(name: str, estimate: Estimate) -> list[list[str]]:
-    """Rows of a table: what it is and its interval, one for each component."""
+    """Rows of a table: quantity and interval, one for each component."""
     name = name.replace("_", " ")
     if not isinstance(estimate.value, tuple):
         return [[name, interval(estimate)]]
@@ -166,12 +166,12 @@ def layers_of(diagnosis: Diagnosis) -> str:
 
 
 def is_error(u: Unexplained) -> bool:
-    """Whether it says how far the fitted model is off, in a recording's unit; else it doubts what was found."""
+    """Whether it states the fitted model's error, in a recording's unit; else it doubts a finding."""
     return u.unit in ("deg", "m")
 
 
 def left_row(u: Unexplained) -> list[str]:
-    """What is off, in which take, by how much, over noise, and what it goes with."""
+    """The remaining error, its take, its size, its ratio to noise, and its correlation."""
     over = f"{u.error / u.floor:.1f}×" if u.floor > 0 else "–"
     by, d = quantity(u.error, u.unit), u.description
     if not isinstance(d, Dependence):
@@ -186,7 +186,7 @@ def left_row(u: Unexplained) -> list[str]:
 
 
 def next_said(n: NextExperiment) -> str:
-    """What to play, how the robot is held, and what that separates."""
+    """The motion to record next, how to hold the robot, and the names it separates."""
     base = ("with the base held on the stand, feet in the air" if n.base == "fixed" else
             "with the robot free on the floor")
     pairs = [f"{name_of(a)} from {name_of(b)}" for a, b in n.separates]

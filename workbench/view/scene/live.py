@@ -25,7 +25,7 @@ from workbench.view.shapes import RobotShapes, robot_shapes
 
 FRAME_RATE = 30.0
 GHOST = Rgba(0.85, 0.37, 0.0, 0.4)
-"""Of the recorded robot beside the simulated one."""
+"""Offset of the recorded robot from the simulated one."""
 FINEST = 0.01
 """Step of a joint's slider [rad]."""
 

@@ -21,7 +21,7 @@ PATH, TILT = "path", "tilt"
 LARGEST, SMALLEST = 0.085, 0.3
 """Radius of the darkest mark in heights of the robot, and of the palest in radii of the darkest."""
 COLOUR_TOLERANCE = 0.06
-"""What a mark's colour may be off between its key frames; less than anyone sees."""
+"""Tolerance of a mark's colour between its key frames; invisible."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Marks:
-    """What was added: the legend's words, whether they stand there from the start, and their paths."""
+    """The added marks: the legend's text, whether they are visible at the start, and their paths."""
 
     label: str
     shown: bool
@@ -74,7 +74,7 @@ class Marker:
         return Marks(errors.label, errors.shown, tuple(paths))
 
     def _placed(self, name: str, place: str) -> str:
-        """Sets the mark down, as a child of what it moves with; returns its path."""
+        """Adds the mark as a child of the object it moves with; returns its path."""
         sphere = Sphere(LARGEST * self.height)
         if place == PATH:
             path = f"/{self.prefix}/{place}/{name}"
@@ -94,7 +94,7 @@ class Marker:
         return path
 
     def _animate(self, path: str, ratio: Array, sized: bool) -> None:
-        """Colour and size; grey where nobody saw it, which is so before the first command too. The colour shines by itself:
+        """Colour and size; grey where it was not seen, which includes the time before the first command. The colour is emissive:
         light and shadow do not change it."""
         time = self.played.time
         middles = np.concatenate([[-1e-6], BIN * (np.arange(len(ratio)) + 0.5)])

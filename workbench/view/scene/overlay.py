@@ -27,9 +27,9 @@ class Copy:
 
 @dataclass(frozen=True)
 class Legend:
-    """What the page says about itself: names of the robots, the forces' scale [N per m of arrow], the grid's spacing [m],
-    the first frame's time since the first command [s], when poses were commanded [s], and the middle [m] and half width [m] of
-    the floor that is walked on, and how far beside the recorded robot is set on demand [m]; meshes to copy; marks of
+    """Content of the page's overlay: names of the robots, the forces' scale [N per m of arrow], the grid's spacing [m],
+    the first frame's time since the first command [s], when poses were commanded [s], the middle [m] and half width [m] of
+    the floor that is walked on, and the optional sideways offset of the recorded robot [m]; meshes to copy; marks of
     errors."""
 
     title: str

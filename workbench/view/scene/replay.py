@@ -33,12 +33,12 @@ MAX_FRAMES = 900
 GHOST_ALPHA = 0.45
 POSITION_TOLERANCE = 5e-4
 ANGLE_TOLERANCE = 6e-3
-"""What the film may be off between its key frames [m, rad]; less than anyone sees, and it halves the file."""
+"""Tolerance of the animation between its key frames [m, rad]; invisible, and it halves the file."""
 
 
 @dataclass(frozen=True)
 class ReplayFile:
-    """What was written: path, size [bytes], frames and their rate [1/s]."""
+    """The file: path, size [bytes], frames and their rate [1/s]."""
 
     path: Path
     size: int

@@ -20,7 +20,7 @@ from workbench.simulation.play import play_motion
 
 
 def subject_of(name: str) -> Literal["model", "session", "take"]:
-    """Told by the name and, of a YAML file, by its keys. InputError where a YAML file cannot be read."""
+    """Recognised by the name and, for a YAML file, by its keys. InputError where a YAML file cannot be read."""
     path = Path(name)
     if name in ROBOTS or name.startswith("package://") or path.suffix.lower() in (".sdf", ".urdf", ".xml"):
         return "model"

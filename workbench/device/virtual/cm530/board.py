@@ -41,7 +41,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Violation:
-    """What no correct program does: when [ticks], and what."""
+    """Forbidden actions of a program: when [ticks], and which."""
 
     time: int
     what: str
@@ -214,7 +214,7 @@ class Board:
             self.clock.after(late * usart.byte, partial(self._heard_late, value))
 
     def _heard_late(self, value: int) -> None:
-        """A byte beyond what the DMA wanted at first: it may want more by now; else nobody asked."""
+        """A byte beyond the DMA's first request: it may have been extended by now; else nobody asked."""
         if not (self.servo_usart.takes_dma and self.dma.channels[5].take(bytes([value]))):
             self.servo_usart.receive(value)
 

@@ -16,7 +16,7 @@ _INTERRUPT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_v
 
 
 class Engine:
-    """One unicorn engine. What is called back must raise nothing."""
+    """One unicorn engine. Callbacks must not raise."""
 
     def __init__(self, uc: unicorn.Uc) -> None:
         self.uc = uc

@@ -1,4 +1,4 @@
-"""dynamixel-sdk on the PC link of a virtual CM-530: what is written goes to its USART, and time is the board's."""
+"""dynamixel-sdk on the PC link of a virtual CM-530: written bytes go to its USART, and time is the board's."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         self._read += self.getBytesAvailable()
 
     def writePort(self, packet: Sequence[int]) -> int:
-        """Sends; time goes on until it is out, as it would with a port that waits."""
+        """Sends; time passes until everything is out, as with a blocking port."""
         end = self.board.send(self.board.pc, bytes(packet))
         self.board.run(end)
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
-        """What is there; where nothing is, half a millisecond goes by."""
+        """Bytes received so far; if there are none, half a millisecond passes."""
         if self.getBytesAvailable() == 0:
             self.board.run(self.board.clock.now + MILLISECOND // 2)
         length = min(max(length, 0), self.getBytesAvailable())

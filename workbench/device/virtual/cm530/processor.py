@@ -24,7 +24,7 @@ _STACKED = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_
 
 
 class BoardError(RuntimeError):
-    """The program did what the real chip would not survive, or what this board does not know."""
+    """The program did something that the real chip would not survive, or that this board does not support."""
 
 
 class Processor:

@@ -173,7 +173,7 @@ class Converter(Peripheral):
 
 
 class Port(Peripheral):
-    """Sixteen pins; `inputs` is what the world puts on them."""
+    """Sixteen pins; `inputs` are their external levels."""
 
     known = frozenset((0x00, 0x04, 0x08, 0x0C, 0x10))
 
@@ -195,7 +195,7 @@ class Port(Peripheral):
         return (self.output & self._outputs) | (self.inputs & ~self._outputs & 0xFFFF)
 
     def write(self, offset: int, value: int) -> None:
-        """BSRR sets and clears; the board looks at what has changed."""
+        """BSRR sets and clears; the board examines the changes."""
         before = self.output
         if offset == 0x10:
             value = (before | value & 0xFFFF) & ~(value >> 16)
@@ -220,6 +220,6 @@ class Port(Peripheral):
 
 
 class Plain(Peripheral):
-    """Flash control or alternate functions: words that keep what is written."""
+    """Flash control or alternate functions: plain read-write words."""
 
     known = frozenset((0, 4))

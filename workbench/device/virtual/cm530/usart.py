@@ -127,7 +127,7 @@ class Usart(Peripheral):
 
     @property
     def takes_dma(self) -> bool:
-        """Whether what comes in goes to memory by itself."""
+        """Whether received bytes go to memory by DMA."""
         return bool(self.words[CR1] & (UE | RE) == UE | RE and self.words[CR3] & DMAR)
 
     def receive(self, value: int) -> None:
