@@ -95,7 +95,8 @@ class ServoProfile:
     2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
     control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
     when the bus falls silent. maker: who builds it, for the rules that it gives. group_read: how many are asked at
-    once: Sync Read of protocol 2, Feetech's, or "" for one after the other. marker: a register that does nothing to the
+    once: Sync Read of protocol 2, Feetech's, Bulk Read of protocol 1, or "" for one after the other. fast_read: firmware from
+    which Fast Sync Read is answered, too. marker: a register that does nothing to the
     joint and is forgotten when the servo restarts.
     """
 
@@ -125,7 +126,8 @@ class ServoProfile:
     watchdog: tuple[str, float] | None = None
     marker: str | None = None
     maker: str = ""
-    group_read: Literal["", "sync", "feetech"] = ""
+    group_read: Literal["", "sync", "feetech", "bulk"] = ""
+    fast_read: int | None = None
     source: str = field(default="", compare=False)
 
     @property
