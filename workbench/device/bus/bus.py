@@ -14,7 +14,7 @@ from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
 from workbench.device.bus import group
 from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
 from workbench.device.bus.ports import GONE, StripEcho, gone
-from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, ping
+from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, parameters_of, ping, read_packet
 from workbench.robot.servo_profile import Register, ServoProfile
 
 T = TypeVar("T")
@@ -86,8 +86,8 @@ class Bus:
 
         def call() -> tuple[bytes, int, int]:
             self.asked = self.now() + (8 if self.profile.protocol == 1 else 14) * self.port.tx_time_per_byte / 1000
-            answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
-            return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
+            answer, result, error = self._handler.txRxPacket(self.port, read_packet(self.profile.protocol, servo, first, count))
+            return parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
 
         data = self._asked(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
@@ -184,12 +184,11 @@ class Bus:
         return sent
 
     def release(self, servos: Iterable[int]) -> None:
-        """Torque off, of all at once and twice, as nobody answers; never raises for a servo, only where the port is gone."""
+        """Torque off in one packet, sent twice, as nobody answers it. PortGoneError is the only error."""
         off = {servo: {"torque_enable": 0} for servo in servos}
-        if off:
+        for _ in range(2 if off else 0):
             self.sync_write(off)
             self.pause(0.002)
-            self.sync_write(off)
 
     def let_go(self, servos: Iterable[int], seconds: float = 1.0) -> tuple[int, ...]:
         """Torque off, read back, and written again for so long [s] to servos that do not confirm it: a packet with a wrong length
@@ -294,18 +293,6 @@ class Bus:
             raise gone(e) from None
         finally:
             self.port.is_using = False
-
-    def _read_packet(self, servo: int, address: int, count: int) -> list[int]:
-        """As the SDK's packet handlers want it: header and checksum are theirs to fill in."""
-        if self.profile.protocol == 1:
-            return [0, 0, servo, 4, 2, address, count, 0]
-        return [0, 0, 0, 0, servo, 7, 0, 2, address & 0xFF, address >> 8, count & 0xFF, count >> 8, 0, 0]
-
-    def _parameters(self, answer: list[int]) -> bytes:
-        """Those that the answer itself says it has: the SDK's readTxRx takes the checksum for data where there are fewer."""
-        if self.profile.protocol == 1:
-            return bytes(answer[5:answer[3] + 3])
-        return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
 
 
 def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:
