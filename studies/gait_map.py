@@ -51,7 +51,8 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     found.save(out / "map.json")
     o = found.options
     filled = f"{len(found.cells)} of {o.cells**2} cells filled ({100 * found.filled:.0f} %)"
-    summary = (f"{filled}, {100 * found.reproduced:.0f} % of them reproduced by {o.fresh} fresh robots; {found.rollouts} rollouts, {processor:.0f} s of processor, {wall:.0f} s")
+    summary = (f"{filled}, {100 * found.reproduced:.0f} % of them reproduced by {o.fresh} fresh robots; "
+               f"{found.rollouts} rollouts, {processor:.0f} s of processor, {wall:.0f} s")
     figure = drawn(found)
     report = Report("A map of gaits", summary, f"{__doc__}\n\n{PUPPY_CLAIM}", [], Provenance.of(model))
     report.add(Section("The map", [Picture(figure, "Full circles: reproduced.")]))

@@ -95,7 +95,8 @@ class ServoProfile:
     position control. unlock: register that allows the EEPROM to be written. watchdog: register and its unit [s] with which a
     servo stops automatically when the bus falls silent. maker: manufacturer, for its recommendations. group_read: how many are
     asked at once: Sync Read of protocol 2, Feetech's, Bulk Read of protocol 1, or "" for one after the other. fast_read: firmware
-    from which Fast Sync Read is answered, too. marker: a register without effect on the that is reset when the servo restarts.
+    from which Fast Sync Read is answered, too. marker: a register without effect on the joint,
+    reset when the servo restarts.
     """
 
     name: str

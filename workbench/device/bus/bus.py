@@ -37,8 +37,8 @@ class Bus:
     port: dynamixel-sdk's, with `pause` and `patience` (`SerialPort`, or a virtual one). joints: by ID, for messages.
     alarms: state in each servo's last answer. retries: by ID, how often it had to be asked again.
     strip_echo: for an adapter that is known to hear itself; any other that does is refused. latency: delay of answers
-    beyond their bytes [s], once it was measured. group_kind: how many servos are asked at once, "" for one after the other. asked: when the last byte of the last question was out [s], since the servo
-    answers with its state at that time.
+    beyond their bytes [s], once it was measured. group_kind: how many servos are asked at once, "" for one after the
+    other. asked: when the last byte of the last question was out [s], since the servo answers with its state at that time.
     """
 
     def __init__(self, port: Any, profile: ServoProfile, joints: Mapping[int, str] | None = None,
