@@ -27,7 +27,7 @@ from workbench.gait.request import Request
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, space_of
-from workbench.gait.table import AT_ONCE, GaitTable, paths_of, table_of
+from workbench.gait.table import GaitTable, paths_of, table_of
 from workbench.motion import Commands
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig
@@ -184,7 +184,7 @@ class _Search:
         limits, out = GaitLimits(), list[GaitTable | None]()
         for paths in paths_of(self.machine, shapes):
             try:
-                table = table_of(self.machine, paths, "map", AT_ONCE) if paths.off.max() <= limits.reach else None
+                table = table_of(self.machine, paths, "map") if paths.off.max() <= limits.reach else None
             except InputError:
                 table = None
             good = table is not None and violation(table_margins(self.machine, table, limits)) == 0.0
