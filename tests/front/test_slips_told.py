@@ -26,7 +26,8 @@ def test_an_effect_at_no_part_of_the_robot_is_refused_where_it_is_added(robot: w
 
 
 @pytest.mark.parametrize(("effect", "parameters", "said"), [
-    ("backlsh", {"gap": 2.0}, "backlsh"), ("backlash", {"gab": 2.0}, "parameter .gap. .deg. is missing"),
+    ("backlsh", {"gap": 2.0}, "backlsh"),
+    ("backlash", {"gab": 2.0}, "parameter .gap. .deg. is missing"),
     ("backlash", {"gap": -2.0}, "gap")])
 def test_a_model_with_an_impossible_effect_is_not_saved(robot: workbench.RobotModel, tmp_path: Path, effect: str,
                                                        parameters: dict[str, float], said: str) -> None:

@@ -210,9 +210,9 @@ class RobotModel:
             f"<td>{math.degrees(k.frames[j].lower):.0f} to {math.degrees(k.frames[j].upper):.0f}</td></tr>"
             for j, s in ((j, self.servo(j)) for j in self.joints))
         effects = ", ".join(escape(" ".join([e.effect, *e.where])) for e in self.effects) or "none"
+        heads = "".join(f"<th>{head}</th>" for head in ("joint", "link", "servo", "stall torque [N m]", "range [deg]"))
         return (f"<p>{escape(Path(self.description).name)}: base {escape(self.base)}, {k.mass:.3f} kg, "
-                f"{len(self.joints)} joints; effects: {effects}</p><table><tr><th>joint</th><th>link</th><th>servo</th><th>stall torque [N m]</th>"
-                f"<th>range [deg]</th></tr>{rows}</table>")
+                f"{len(self.joints)} joints; effects: {effects}</p><table><tr>{heads}</tr>{rows}</table>")
 
     def check_base(self, floating: bool) -> None:
         """InputError unless the base is a link of the model, and the root of its tree where it has to float."""
