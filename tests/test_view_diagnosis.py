@@ -180,7 +180,7 @@ def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(mo
     told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
     assert all("The tether force is a pull straight down, with the weight of 76 g that does" in page for page in told.values())
-    assert ["still off by more than noise" in page for page in told.values()] == [False, True]
+    assert ["still exceeds noise" in page for page in told.values()] == [False, True]
 
 
 def test_reasons_name_effects_as_people_do() -> None:
