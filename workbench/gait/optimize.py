@@ -120,9 +120,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         before, found = found.best, refined(evaluator, found, options.refine, progress)
         plans = plans.with_refined(before.shape, found.best.shape)
         provenance: dict[str, Any] = {
-            "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
-            "ensemble_sha256": ensemble.sha256, "method": options.method, "generations": found.generations,
-            "rollouts": found.rollouts, "refined": found.best is not before, "searched in": round(time.monotonic() - began, 1)}
+            "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
+            "ensemble": Path(ensemble.source).name, "ensemble_sha256": ensemble.sha256, "method": options.method,
+            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before,
+            "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)

@@ -114,7 +114,7 @@ def trim(machine: GaitMachine, gait: Gait, recorded: RecordedTurn, ensemble: Ens
     trimmed = replace(request, bias=request.bias - drift(request, walked))
     table = gait_table(machine, turned)
     known = gait.certificate.provenance
-    said = {"workbench": version("drake-workbench"), "drake": version("drake"), "ensemble": ensemble.source,
+    said = {"workbench": version("drake-workbench"), "drake": version("drake"), "ensemble": Path(ensemble.source).name,
             "ensemble_sha256": ensemble.sha256, "seed": known.get("seed", 0), "rollouts": 0, "searched in": 0.0,
             "trimmed": {"turn rad": turned.turn - shape.turn, "heading deg/m": float(np.degrees(recorded.heading)),
                         "standard deviation deg/m": float(np.degrees(recorded.sd)), "metres": recorded.metres,

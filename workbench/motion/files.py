@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
+from workbench.files.nearest import did_you_mean
 from workbench.files.numerals import number_of, whole_of
 from workbench.files.reading import write_whole
 from workbench.files.tables import plain_text
@@ -48,7 +49,8 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
         motion = load_trajectory(file, page)
         strange = [joint for joint in motion.joints if model is not None and joint not in model.joints]
         if strange and model is not None:
-            raise InputError(path, f"the robot has no joint '{strange[0]}'; its joints: {' '.join(model.joints)}")
+            raise InputError(path, f"the robot has no joint '{strange[0]}'; its joints: {' '.join(model.joints)}"
+                             + did_you_mean(strange[0], model.joints))
     else:
         motion = _parse(path, plain_text(path), model)
     return motion if model is None else replace(motion, units=units_of(model, motion.joints))
@@ -155,7 +157,8 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
         if first.count(name) > 1:
             raise InputError(path, f"line {n}: column '{name}' stands there twice")
         if name not in ("time", SECTION) and known is not None and name.removeprefix(SPEED) not in known:
-            raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}")
+            raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}"
+                             + did_you_mean(name, known))
     return first, lines[1:]
 
 

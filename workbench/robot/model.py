@@ -13,6 +13,7 @@ from typing import Any, Literal
 import yaml
 
 from workbench.files import InputError
+from workbench.files.nearest import did_you_mean
 from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
@@ -53,6 +54,11 @@ class EffectSpec:
     effect: str
     where: tuple[str, ...] = ()
     parameters: Mapping[str, float | tuple[float, float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.where, str):
+            raise InputError(None, f"effect '{self.effect}': where: expected a tuple of names, as ('{self.where}',), got "
+                                   f"'{self.where}'")
 
 
 @dataclass(frozen=True)
@@ -129,7 +135,14 @@ class RobotModel:
         return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
-        """The same robot with one effect more."""
+        """The same robot with one effect more. InputError where it names a part that the robot does not have; whether the effect
+        is known and its numbers are possible is checked where a station is made of it, or the model saved."""
+        k = self.kinematics
+        parts = {*self.joints, *k.links, *self.foot_links, *self.rigid_bodies}
+        strange = [name for name in effect.where if name not in parts]
+        if strange:
+            raise InputError(None, f"effect '{effect.effect}': where: the robot has no '{strange[0]}'"
+                                   f"{did_you_mean(strange[0], parts)}")
         return self.with_effects((*self.effects, effect))
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:

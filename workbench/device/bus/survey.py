@@ -124,6 +124,9 @@ def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
         if servo not in doubled:
             joint = joints.get(servo)
             found[servo] = _describe_servo(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
+    fast = bus.profile.fast_read
+    if fast is not None and found and all(s.registers.get("firmware_version", 0) >= fast for s in found.values()):
+        bus.group_kind = "fast"
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
     return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
 

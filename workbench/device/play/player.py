@@ -251,13 +251,13 @@ class _Performance:
             self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
 
     def _let_go(self) -> bool:
-        """On a bus that may be gone; whether it could be told."""
+        """On a bus that may be gone; whether all servos have confirmed it."""
         try:
-            self.rig.bus.release(self.rig.ids.values())
+            unknown = self.rig.release()
             self.rig.limit_torque(1)
         except (BusError, InputError):
             return False
-        return True
+        return not unknown
 
 
 def _time(bus: Bus) -> float:

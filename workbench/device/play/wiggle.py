@@ -65,9 +65,11 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
         go(here)
         bus.pause(o.by / o.speed + o.rest)
     finally:
-        bus.release([servo.id])
+        held = bus.let_go([servo.id])
         bus.sync_write({servo.id: {"torque_limit": limit}})
         bus.pause(0.002)
+    if held:
+        raise BusError("does not confirm that its torque is off; switch the robot's power off", servo.id, servo.joint)
     return Wiggled(servo.joint, servo.id, went, went < o.moved * o.by)
 
 

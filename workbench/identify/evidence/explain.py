@@ -24,7 +24,7 @@ from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, continue_search, lockstep, with_best, with_fits, without_names
 from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
-from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
+from workbench.identify.evidence.unknown_law import carried_on, on_windows, slopes_by_law, with_unknown_law
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
@@ -102,15 +102,17 @@ def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Can
 
 
 def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was found in each joint, with models that have an unnamed torque there."""
-    parts = {}
-    for k, f in enumerate(found):
-        (joint,) = f.region.joints
-        law = torque_law(joint, rollouts.evaluator.evidence, rollouts.nominal, options.law)
-        if law is not None:
-            full = rollouts.nominal.servo(joint).torque_at_full_duty
-            parts[k] = with_unknown_law(f, options, law, full)
-    done = lockstep(rollouts, parts)
+    """The models of each joint, with those that have an unnamed torque there: found on windows, judged as the others are."""
+    laws = {k: torque_law(f.region.joints[0], rollouts.evaluator.evidence, rollouts.nominal, options.law)
+            for k, f in enumerate(found)}
+    seen, known = rollouts, dict(enumerate(found))
+    if rollouts.horizon > options.horizon:
+        seen = rollouts.around_here(rollouts.step, options.horizon)
+        known = lockstep(seen, {k: on_windows(f, options) for k, f in known.items() if laws[k] is not None})
+    done = lockstep(seen, {k: with_unknown_law(f, options, law) for k, f in known.items()
+                           if (law := laws[k]) is not None})
+    if seen is not rollouts:
+        done = lockstep(rollouts, {k: carried_on(found[k], f, options) for k, f in done.items()})
     found = tuple(done.get(k, f) for k, f in enumerate(found))
     return with_best(rollouts, found), found
 
@@ -147,7 +149,7 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
     fit = yield from regressed(region, options, fit)
-    fit = replace(fit, beside=(yield from slopes_by_law(fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit = replace(fit, beside=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

@@ -163,20 +163,38 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     """Some states extended, each by so many of the moves that predict most; those are fitted, and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
+    published: dict[Key, Move] = {}
     for f in states:
         alone = yield from linearised(region, options, f)
+        if not f.hypothesis.effects:
+            published = {m.hypothesis.key: m for m in (yield from _from_published(region, options, f))}
+            least = dict.fromkeys((m.hypothesis.key for m in alone), -np.inf) | {key: m.gain for key, m in published.items()}
+            alone = sorted((replace(m, gain=max(m.gain, least[m.hypothesis.key])) for m in alone), key=lambda m: -m.gain)
         alone, both = ([m for m in each if m.hypothesis.key not in fits]
                        for each in (alone, best_of_each(in_pairs(region, options, f, alone))))
         moves += [(f, m) for m in to_be_fitted(alone, both, options)[:refined]]
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
+    made = yield from side_by_side([_moved(region, options, f, m, published.get(key)) for key, (f, m) in wanted.items()])
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
     fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
+
+
+def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+    """Every effect alone, predicted around the nominal law as it stands; gains compared with a plain fit f. A plain fit adjusts
+    the law for want of the effect, and predicts its size badly."""
+    h = start(region.numbers)
+    if not len(h.theta):
+        return []
+    steps = np.where(h.theta + options.stride <= h.bounds()[1], options.stride, -options.stride)
+    r, *moved = yield [h, *(h.at(h.theta + by) for by in np.diag(steps))]
+    there = judged(region, options, h, r, np.column_stack([(m - r) / by for m, by in zip(moved, steps)]))
+    moves = yield from linearised(region, options, there)
+    return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 
 
 def _with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
@@ -197,14 +215,15 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more with the nominal law as it
-    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move, published: Move | None = None) -> Asks[Fitted]:
+    """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more from the nominal law as it
+    stands, with the size that it predicts (published), as a law recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis
     fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
                                     fitting(region, options, _as_published(h), f.discrepancy, options.iterations, None,
-                                            None if shaped else m.J)])
+                                            None if shaped else m.J) if published is None else
+                                    fitting(region, options, published.hypothesis, f.discrepancy, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 

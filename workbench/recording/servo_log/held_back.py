@@ -16,7 +16,7 @@ class HeldBackChecks:
     """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves
     over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its
     extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
-    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain within `alike` of 1, to
+    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain of 1 +- `tolerance`, to
     `explained` of its variance, and with a residual of at most `share` of that distance."""
 
     goes: float = 5.0
@@ -27,7 +27,7 @@ class HeldBackChecks:
     visits: int = 3
     rows: int = 3
     off: float = 12.0
-    alike: float = 0.15
+    tolerance: float = 0.15
     explained: float = 0.95
     share: float = 0.25
 
@@ -47,7 +47,7 @@ def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
                "off, a gain of 0, a servo or horn that came loose, or another joint's column?")
         return
     yield from _ends(log, fit, c)
-    if fit.explained < c.explained or abs(fit.gain - 1) > c.alike:
+    if fit.explained < c.explained or abs(fit.gain - 1) > c.tolerance:
         return
     yield from _stands_off(log, fit, c)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
@@ -42,6 +42,14 @@ def headline(diagnosis: Diagnosis) -> str:
             return f"A torque at {where} that no known effect describes explains at least part of the model's error."
         case "unexplained":
             return "The recordings differ from the model, and no effect that the workbench knows explains how."
+
+
+def hidden_effects(why: Mapping[str, str]) -> list[str]:
+    """A sentence for each reason why a session's takes cannot show some effects; why: the reason, by effect and place."""
+    by_reason: dict[str, list[str]] = {}
+    for effect, reason in why.items():
+        by_reason.setdefault(reason, []).append(effect.replace("_", " "))
+    return [f"**Cannot show here**, because {reason}: {listed(effects)}." for reason, effects in by_reason.items()]
 
 
 def _with_rival(f: Finding) -> str:

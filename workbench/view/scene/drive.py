@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, Rgba
 from pydrake.math import RigidTransform, RollPitchYaw
 
@@ -13,10 +12,10 @@ from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc
 from workbench.gait.drive.walk import Seen
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.scene.live import open_meshcat
 from workbench.view.scene.live import show as show_model
 
-Array = NDArray[np.float64]
 PATH, PLAN, SEEN, DISC = Rgba(0.3, 0.3, 0.3), Rgba(0.85, 0.37, 0.0), Rgba(0.0, 0.45, 0.7), Rgba(0.7, 0.1, 0.1, 0.6)
 RAISED = 0.004
 """Height of lines above the floor [m], so that both are seen."""
