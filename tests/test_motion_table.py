@@ -147,7 +147,7 @@ def test_moving_speeds_of_their_own_survive_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(("header", "said"), [
-    ("time,a,b,speed.a", "column 'speed.b': expected speed.JOINT of all joints or of none"),
+    ("time,a,b,speed.a", "column 'speed.b': expected speed.JOINT for every joint or for none"),
     ("time,a,speed.a,speed.c", "column 'speed.c'"),
 ])
 def test_moving_speeds_are_of_all_joints_or_of_none(tmp_path, header, said):

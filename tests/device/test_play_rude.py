@@ -137,7 +137,7 @@ def test_a_dead_supply_on_the_way_back_releases(tmp_path):
     r.at(3.1, lambda: setattr(r.wire, "supply", 6.0))
     result, _ = perform_on(r, tmp_path, wave(0.5, degrees=60.0), 20, stop=lambda: stop.reason)
     assert result.stopped.startswith("Ctrl-C; then servo ")
-    assert "6.0 V, the supply is gone" in result.stopped
+    assert "6.0 V, the supply has failed" in result.stopped
     off = min(seconds(t) for s in r.servos.values() for t, a, v in s.written if a == 24 and not v)
     assert off < 3.3
 
