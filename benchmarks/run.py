@@ -54,7 +54,7 @@ def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what
     figures = _measure(QUICK if quick else Size(), progress) + _fits(quick, progress)
     warnings = ["quick: too little was measured for the figures to mean anything"] if quick else []
     if load > 1:
-        warnings.append(f"load average {load:.1f} at the start: other work falsifies what is measured in wall time, the batch "
+        warnings.append(f"load average {load:.1f} at the start: other work distorts the figures in wall time, the batch "
                         "and the reader")
     return {"format": 1, "quick": quick, "machine": _machine(load), "versions": _versions(), "seed": SEED, "warnings": warnings,
             "figures": {f.name: f.to_json() for f in figures}, "seconds": time.perf_counter() - began}

@@ -17,8 +17,8 @@ from workbench.simulation.compiled.angles import servo_angles
 from workbench.types import Array
 
 NAME = "servo_log_rollouts_against_mujoco"
-MEANING = ("speed of this library's rollouts of a held arm's servo log over MuJoCo's, each with other frictions of one joint, at the "
-           "same step; both count building the model and reading angles at the log's times")
+MEANING = ("speed of this library's rollouts of a held arm's servo log over MuJoCo's, each with other frictions of one joint, at "
+           "the same step; both include building the model and reading angles at the log's times")
 
 
 def servo_log_rollouts_against_mujoco(duration: float, models: int, repeats: int, seed: int) -> Figure:

@@ -1,4 +1,4 @@
-"""The bench measures what it says, at a size that tests can afford; the figures themselves belong to a quiet machine."""
+"""The bench measures the figures it states, at a size that tests can afford; their values belong to a quiet machine."""
 
 import json
 import sys
