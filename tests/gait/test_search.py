@@ -85,7 +85,7 @@ def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(ma
     assert not result.met
     assert "slope, friction 0.5: 30 of 26.6 deg" in result.problem
     brief = replace(options_of(1).certify, step=2e-3, variants=("2 ms",))
-    lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6)  # so that six seeds are enough
+    lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6, rms=1.3, torque=2.0)  # six seeds are few
     result = optimize(machine, Request(speed=3.0, limits=lax), Ensemble(), OptimizeOptions(SMALL, brief, planned=False), quiet)
     assert "cannot be met by any gait: foot speed" in result.problem
     assert "the nearest table that a first look found goes" in result.problem
