@@ -165,7 +165,8 @@ def _load(model: RobotModel, link: str, path: RobotTrajectory, required: Array, 
     center = np.asarray(model.kinematics.centers.get(link, np.zeros(3)), dtype=float)
 
     def of(position: Array) -> Array:
-        loaded = model.with_effect(EffectSpec("payload", (link,), {"mass": _PROBE, "position": tuple(map(float, position))}))
+        x, y, z = map(float, position)
+        loaded = model.with_effect(EffectSpec("payload", (link,), {"mass": _PROBE, "position": (x, y, z)}))
         return np.asarray((Machine(loaded).demand(path)[1] - required)[:, columns] / _PROBE)
 
     middle = of(center)

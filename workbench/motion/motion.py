@@ -57,7 +57,7 @@ class Motion:
             raise InputError(self.source, f"{said}: expected a pose of the loop, too")
         twice = [j for i, j in enumerate(self.joints) if j in self.joints[:i]]
         if twice:
-            raise InputError(self.source, f"joint '{twice[0]}' stands there twice")
+            raise InputError(self.source, f"joint '{twice[0]}' is given twice")
         for k, i in np.argwhere(~np.isfinite(self.angles))[:1]:
             raise InputError(
                 self.source, f"row {k + 1}, joint {self.joints[i]}: expected a finite angle, got {self.angles[k, i]}")
