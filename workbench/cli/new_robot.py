@@ -14,7 +14,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "new-robot",
         help="write session.yaml and servo.yaml for a robot of your own",
         description="Writes session.yaml and servo.yaml for a robot described by an SDF or URDF, with the constants that its "
-        "servo's maker states, and lists its guesses and the facts that only you know. Existing files are not changed.",
+        "servo is published with, and lists its guesses and the facts that only you know. Existing files are not changed.",
     )
     parser.add_argument("description", metavar="URDF")
     parser.add_argument("--servo", required=True, metavar="TYPE", help="LX-16A, STS3215, XL-430 …; an unknown one lists all")
