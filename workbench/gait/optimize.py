@@ -120,9 +120,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         before, found = found.best, refined(evaluator, found, options.refine, progress)
         plans = plans.with_refined(before.shape, found.best.shape)
         provenance: dict[str, Any] = {
-            "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
-            "ensemble_sha256": ensemble.sha256, "method": options.method, "generations": found.generations,
-            "rollouts": found.rollouts, "refined": found.best is not before, "searched in": round(time.monotonic() - began, 1)}
+            "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
+            "ensemble": Path(ensemble.source).name, "ensemble_sha256": ensemble.sha256, "method": options.method,
+            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before,
+            "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
@@ -223,7 +224,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
-        said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
+        said += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
     return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
 
 
@@ -263,7 +264,7 @@ def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | Non
     if limit is not None:
         said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if nearest is not None:
-        said += f"; the nearest table that keeps every limit goes {_speed(request, nearest)}"
+        said += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
     return said
 
 
