@@ -12,7 +12,7 @@ from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.evidence.torque_law import Functions, TorqueLaw
-from workbench.identify.evidence.unknown_law import with_unknown_law
+from workbench.identify.evidence.unknown_law import carried_on, on_windows, with_unknown_law
 
 AT = np.linspace(-90.0, 90.0, 19)
 PEAKS = np.exp(-0.5 * np.square((AT[:, None] - np.array([-60.0, -30.0, 0.0, 30.0, 60.0])) / 30.0))
@@ -98,6 +98,17 @@ def test_a_name_that_the_law_could_stand_for_is_less_well_known():
     alone = np.linalg.inv((best.J.T * found.region.likelihood.precision(best.r, best.discrepancy)) @ best.J
                           + np.eye(len(best.hypothesis.theta)))
     assert best.covariance(found.region, OPTIONS)[-1, -1] > alone[-1, -1]
+
+
+def test_a_law_found_over_windows_is_fitted_to_whole_logs():
+    after, found, _ = searched(robot({}, WEIGHTS))
+    windows = lockstep(after, {0: on_windows(found, OPTIONS)})[0]
+    assert len(windows.fits) == 1
+    seen = lockstep(after, {0: with_unknown_law(windows, OPTIONS, torque_law())})[0]
+    done = lockstep(after, {0: carried_on(found, seen, OPTIONS)})[0]
+    assert {f.hypothesis.key for f in found.fits.values()} < {f.hypothesis.key for f in done.fits.values()}
+    assert posterior_of(list(done.fits.values()), OPTIONS).unnamed > 0.95
+    np.testing.assert_allclose(done.best.hypothesis.law.weights[:5], WEIGHTS[:5], atol=0.25 * 0.03)
 
 
 def test_tables_hold_the_law():

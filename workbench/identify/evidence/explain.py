@@ -1,4 +1,4 @@
-"""Servo logs explained by evidence: from recordings to a model with its names, their probabilities, and what speaks against
+"""Servo logs explained by evidence: from recordings to a model with its names, their probabilities, and the reasons against
 others."""
 
 from __future__ import annotations
