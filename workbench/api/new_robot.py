@@ -71,7 +71,7 @@ def new_robot(description: str | Path, servo: str, out: str | Path, takes: Seque
         guessed.append(f"feet: {', '.join(feet)}")
     missing = [*_ranges(model, travel),
                "supply_voltage: measure it at the servo while it works, and write it into servo.yaml",
-               "proportional_gain, coulomb_friction and reflected_inertia are guesses: docs/record.md says how to measure a gain"]
+               "proportional_gain, coulomb_friction, reflected_inertia are guesses: docs/record.md shows how to measure them"]
     if not takes:
         missing.append("takes: record some (docs/record.md) and list them in session.yaml")
     missing.append("bus_ids: the servos' numbers, if the workbench is to move the robot")

@@ -286,4 +286,4 @@ def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     allowed = {name for place in effect.places for name in known[place]}
     for name in spec.where:
         if name not in allowed:
-            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is no {' or '.join(effect.places)} of this robot")
+            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is not a {' or '.join(effect.places)} of this robot")

@@ -44,7 +44,8 @@ def trajectories(path: str | Path) -> list[Any]:
     except Exception as e:
         if not isinstance(e, _DAMAGED) and not type(e).__module__.startswith("rosbags"):
             raise
-        raise InputError(path, f"a bag that cannot be read: {' '.join(str(e).split())[:200]}") from None
+        raise InputError(path, "a bag that cannot be read as a rosbag (ROS 1, SQLite, MCAP): "
+                               f"{' '.join(str(e).split())[:200]}") from None
 
 
 def _messages(path: Path) -> list[Any]:

@@ -82,7 +82,7 @@ def servo_profile(model: str) -> ServoProfile:
     if profile is not None:
         return profile
     raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
-                           f"profile of its own ({_plain(model)}.yaml; docs/extending.md says how), as its counts are unknown")
+                           f"profile of its own ({_plain(model)}.yaml; see docs/extending.md), as its counts are unknown")
 
 
 def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:

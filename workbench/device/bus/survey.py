@@ -176,7 +176,7 @@ def _mode(servo: FoundServo, profile: ServoProfile) -> Iterable[str]:
     if r["cw_angle_limit"] == r["ccw_angle_limit"]:
         yield f"both angle limits are {r['cw_angle_limit']}: it turns without end (wheel mode); set them with --write"
     if r["torque_limit"] == 0 or r["max_torque"] == 0:
-        yield "its torque is limited to nothing: an alarm shut it down, or somebody set it so; switch its power off and on"
+        yield "its torque is limited to nothing: an alarm shut it down, or a person did; switch its power off and on"
     for name, expected in profile.position_mode.items():
         if r[name] != expected:
             yield f"{name} is {r[name]}; expected {expected}, for plain position control"
@@ -194,5 +194,5 @@ def _nobody(bus: Bus, wanted: list[int]) -> BusError:
     elsewhere = bus.find_at_any_rate(wanted)
     if elsewhere:
         other, servos = max(elsewhere.items(), key=lambda item: len(item[1]))
-        return BusError(f"nobody answers at {rate} bit/s, but {len(servos)} do at {other}; say --rate {other}")
-    return BusError(f"nobody answers, at {rate} bit/s or any other; is the servos' power on, and is this the right port?")
+        return BusError(f"no servo answers at {rate} bit/s, but {len(servos)} do at {other}; say --rate {other}")
+    return BusError(f"no servo answers, at {rate} bit/s or any other; is the servos' power on, and is this the right port?")

@@ -40,7 +40,7 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
     does not answer; InputError where it has no joint, or has torque already, as then something else moves it."""
     o, profile = options or WiggleOptions(), bus.profile
     if servo.joint is None:
-        raise InputError(None, f"servo {servo.id} is no joint of the model")
+        raise InputError(None, f"servo {servo.id} is not a joint of the model")
     if bus.read(servo.id, "torque_enable")["torque_enable"]:
         raise BusError("its torque is on; switch the robot off and on first", servo.id, servo.joint)
     here = bus.read(servo.id, "present_position")["present_position"]

@@ -21,7 +21,7 @@ from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
-from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, with_fits, without_names
+from workbench.identify.evidence.search import Found, continue_search, lockstep, with_best, with_fits, without_names
 from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import carried_on, on_windows, slopes_by_law, with_unknown_law
@@ -60,15 +60,15 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
         left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
         found = tuple(left.get(k, f) for k, f in enumerate(found))
-        rollouts, found = gone_on(rollouts, found, options, progress)
+        rollouts, found = continue_search(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
     names: dict[int, list[Fitted]] = {}
     if options.most:
         progress("names that are tied", None)
-        names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+        names = lockstep(with_best(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
         found = tuple(with_fits(f, names[k], options) for k, f in enumerate(found))
         progress("an unnamed torque", None)
-        rollouts, found = _beside_unnamed(standing(rollouts, found), found, options)
+        rollouts, found = _beside_unnamed(with_best(rollouts, found), found, options)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
@@ -76,13 +76,13 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=whole, regions=entire, errors=step_errors(whole, entire))
     last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
-    fine = standing(fine, found)
+    fine = with_best(fine, found)
     everywhere = Whole(fine, (), options)
-    together = everywhere.fitted(everywhere.begun([f.best for f in found]))
+    together = everywhere.fitted(everywhere.start([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
-    return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
+    return Explanation(nominal, replace(with_best(rollouts, found), shared=together.shared), found, believed, robot,
                        tuple(rejected), options, problem.played.missed, drifting, stopped,
                        tuple(names.get(k, []) for k in range(len(found))))
 
@@ -114,7 +114,7 @@ def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: Evidenc
     if seen is not rollouts:
         done = lockstep(rollouts, {k: carried_on(found[k], f, options) for k, f in done.items()})
     found = tuple(done.get(k, f) for k, f in enumerate(found))
-    return standing(rollouts, found), found
+    return with_best(rollouts, found), found
 
 
 def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:

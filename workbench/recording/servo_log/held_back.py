@@ -70,5 +70,5 @@ def _stands_off(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str
     away = np.rad2deg(log.position - (fit.predicted - fit.offset) / fit.gain)
     middle = float(np.median(away))
     if abs(middle) > c.off and np.rad2deg(fit.spread) < c.share * abs(middle):
-        yield (f"stands {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
+        yield (f"is {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
                "homing offset, a horn turned by a tooth)?")
