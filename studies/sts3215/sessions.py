@@ -93,9 +93,10 @@ def goals_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[En
     return edited
 
 
-def encoder(degrees: float) -> Callable[[list[Entry]], list[Entry]]:
-    """Angles that read so much more than they are."""
-    return lambda rows: [r | {"position": r["position"] + float(np.deg2rad(degrees))} for r in rows]
+def turned(degrees: float) -> Callable[[list[Entry]], list[Entry]]:
+    """Goals and angles of a servo whose horn was set on so far back: both count from the servo's own zero."""
+    by = float(np.deg2rad(degrees))
+    return lambda rows: [r | {"position": r["position"] + by, "goal_position": r["goal_position"] + by} for r in rows]
 
 
 CASES = (
@@ -106,7 +107,7 @@ CASES = (
     Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
     Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
     Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
-    Case("zero", "arm150_0.741kg", 2, edit=encoder(3.0), effects=("zero_offset",), size=3.0),
+    Case("zero", "arm150_0.741kg", 2, edit=turned(3.0), effects=("zero_offset", "ground_tilt"), size=-3.0),
 )
 
 
