@@ -179,7 +179,7 @@ def test_a_joint_that_something_holds_is_let_go(tmp_path):
     sense = r.body.sense
     r.body.sense = lambda joint, now: type(sense(joint, now))(0.6) if joint == 1 else sense(joint, now)
     result = played(tmp_path, r)
-    assert "servo 1 (one): stands at 34 deg and not at 0; what holds it?" in result.stopped
+    assert "servo 1 (one): is at 34 deg instead of 0; what holds it?" in result.stopped
     assert result.poses == 0
     assert limp(r)
 

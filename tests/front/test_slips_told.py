@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import workbench
@@ -48,4 +49,13 @@ def test_a_session_that_verbs_would_refuse_is_no_success(robot: workbench.RobotM
     (tmp_path / "log.csv").write_text(joint_log(*swing(), joint="knee"))
     assert main(["inspect", str(path)]) == 0
     (tmp_path / "log.csv").write_text(joint_log(*swing(), joint="knee")[:60])
-    assert "take 'one' cannot be used" in refused(capsys, "inspect", str(path))
+    assert "none of its takes can be used" in refused(capsys, "inspect", str(path))
+
+
+def test_a_notebook_shows_robots_and_motions_as_tables(robot: workbench.RobotModel) -> None:
+    shown = robot._repr_html_()
+    assert "<td>knee</td><td>shank</td>" in shown
+    assert "2 joints; effects: none" in shown
+    motion = workbench.Motion("<b>", np.array([0.0, 0.5]), ("knee",), np.array([[0.0], [0.5]]))
+    assert "&lt;b&gt;: 1 poses in 0.50 s; the last pose is not the first" in motion._repr_html_()
+    assert "<td>28.6</td>" in motion._repr_html_()

@@ -16,6 +16,7 @@ from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import GaitLimits
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of
+from workbench.gait.refine import RefineOptions
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.search import Budget, Found, search, steered
@@ -84,7 +85,7 @@ def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(ma
     assert not result.met
     assert "slope, friction 0.5: 30 of 26.6 deg" in result.problem
     brief = replace(options_of(1).certify, step=2e-3, variants=("2 ms",))
-    lax = replace(Request().limits, drift=50.0, aside=50.0)
+    lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6, rms=1.3, torque=2.0)  # six seeds are few
     result = optimize(machine, Request(speed=3.0, limits=lax), Ensemble(), OptimizeOptions(SMALL, brief, planned=False), quiet)
     assert "cannot be met by any gait: foot speed" in result.problem
     assert "the nearest table in a quick search reaches" in result.problem
@@ -133,9 +134,9 @@ def test_a_search_that_is_far_from_the_speed_asked_for_ends_halfway(machine):
 
 def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
     brief = replace(options_of(1).certify, draws=0, seconds=1.0, floor_seconds=0.3, step=2e-3, variants=("2 ms",))
-    options = OptimizeOptions(replace(SMALL, draws=0), brief, planned=False)
+    options = OptimizeOptions(replace(SMALL, draws=0), brief, planned=False, refine=RefineOptions(iterations=0))
     request = Request(speed=0.6)
-    lax = replace(request.limits, drift=50.0, aside=50.0)
+    lax = replace(request.limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6)
     result = optimize(machine, replace(request, limits=lax), Ensemble(), options, quiet)
     assert not result.met
     assert "not met" in result.problem

@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the inspection; 2 for a session that other verbs would refuse, or of which they would leave a take out."""
+    """Prints the inspection; returns 2 for a session that other verbs would refuse."""
     from workbench.inspect.recognise import inspect_file
 
     inspection = inspect_file(args.file, dict(args.packages))

@@ -111,10 +111,10 @@ def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:
 def _straightener(machine: GaitMachine, request: Request, table: GaitTable, options: CertifyOptions) -> Straightener | None:
     """What straightens robots that walk this table; None for a gait that cannot be steered."""
     try:
-        gain, speed = heading_gain(machine, request, table.shape, options.step)
+        gain, speed = heading_gain(machine, request, table.shape)
     except InputError:
         return None
-    return Straightener(machine.model, request, table.shape, speed, gain, request.limits.spread, options.step)
+    return Straightener(machine.model, request, table.shape, speed, gain, request.limits.spread)
 
 
 def _take(results: Iterator[Any], count: int) -> list[Any]:

@@ -43,11 +43,12 @@ Motion = tuple[float, float] | None
 class MapOptions:
     """Size of the map and of its search.
 
-    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12 m/s.
-    turn: largest turn of a shape [rad per stance]. family, knees: of all gaits, so that neighbouring cells can follow each other.
-    generations, batch: of pyribs' emitter; robots: drawn ones, beside the nominal one, for the spread. seconds: of each rollout;
-    the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning [m/s]. fresh: drawn robots on which
-    each cell is tried afterwards. same: largest difference of the median there, as a share of the map's range.
+    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12
+    m/s. turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can
+    follow each other. generations, batch: of pyribs' emitter; robots: drawn ones, in addition to the nominal one, for the
+    spread. seconds: of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning
+    [m/s]. fresh: drawn robots on which each cell is tried afterwards. same: largest difference of the median there, as a share
+    of the map's range.
     """
 
     cells: int = 7

@@ -74,7 +74,7 @@ class Straightener:
     speed: float
     gain: float
     spread: float
-    step: float
+    step: float = SEARCH.time_step
 
     def robots(self, robots: Sequence[RobotModel]) -> list[tuple[float, ...]]:
         """Heading by distance [rad/m] of each robot: untrimmed, and after each recorded metre; shorter where it fell."""

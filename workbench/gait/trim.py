@@ -104,7 +104,7 @@ def trim(machine: GaitMachine, gait: Gait, recorded: RecordedTurn, ensemble: Ens
     side, and its draws scatter about that. InputError for a gait that cannot be steered."""
     request, shape = gait.request, gait.shape
     progress("how the gait answers to its turn", None)
-    gain, _ = heading_gain(machine, request, shape, options.step)
+    gain, _ = heading_gain(machine, request, shape)
     excess = recorded.heading - curvature(replace(request, bias=0.0))
     estimate = TurnEstimate.before(request.limits.spread, gain).after(0.0, excess, recorded.sd)
     turned = turned_by(machine, request, shape, estimate.turn)

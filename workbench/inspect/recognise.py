@@ -38,7 +38,7 @@ class Inspection:
 
     rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets,
     markers or channels that have any; share_of_gaps: over all of them. details: further facts about its kind.
-    unusable: why other verbs would refuse a session, or leave takes of it out; empty where they use all of it.
+    unusable: why other verbs would refuse a session; empty where they would not.
     """
 
     file: str
@@ -279,7 +279,9 @@ def _session(path: Path) -> Inspection:
     session = load_session(path)
     check = session_check(session)
     problems = [f"{of}: {text}" for of, lines in check.problems.items() for text in lines]
-    lost = check.refused or (f"{', '.join(sorted(map(str, check.damaged)))} cannot be used" if check.damaged else "")
+    takes = {f"take '{t.name}'" for t in session.takes}
+    none_left = bool(takes) and takes <= set(map(str, check.damaged)) and not session.predict
+    lost = check.refused or ("none of its takes can be used" if none_left else "")
     logged = _logged(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,

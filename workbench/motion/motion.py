@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from html import escape
 
 import numpy as np
 
@@ -35,6 +36,14 @@ class Motion:
     start: int = 0
     stop: int = 0
     cycles: int | None = None
+
+    def _repr_html_(self) -> str:
+        """For a notebook: length and cycles in a sentence, and a row of the extreme angles of each joint."""
+        rows = "".join(f"<tr><td>{escape(j)}</td><td>{a.min():.1f}</td><td>{a.max():.1f}</td></tr>"
+                       for j, a in zip(self.joints, np.rad2deg(self.angles).T))
+        return (f"<p>{escape(self.name)}: {len(self.times) - 1} poses in {self.times[-1] - self.times[0]:.2f} s"
+                f"{'' if self.closes else '; the last pose is not the first'}</p>"
+                f"<table><tr><th>joint</th><th>lowest [deg]</th><th>highest [deg]</th></tr>{rows}</table>")
 
     def __post_init__(self) -> None:
         if self.angles.shape != (len(self.times), len(self.joints)):

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
@@ -200,6 +201,18 @@ class RobotModel:
                 for e in self.effects
             ],
         }
+
+    def _repr_html_(self) -> str:
+        """For a notebook: the tree in a sentence, and a row for each joint's servo and range."""
+        k = self.kinematics
+        rows = "".join(
+            f"<tr><td>{escape(j)}</td><td>{escape(k.frames[j].child)}</td><td>{escape(s.model)}</td><td>{s.torque_at_full_duty:.2f}</td>"
+            f"<td>{math.degrees(k.frames[j].lower):.0f} to {math.degrees(k.frames[j].upper):.0f}</td></tr>"
+            for j, s in ((j, self.servo(j)) for j in self.joints))
+        effects = ", ".join(escape(" ".join([e.effect, *e.where])) for e in self.effects) or "none"
+        heads = "".join(f"<th>{head}</th>" for head in ("joint", "link", "servo", "stall torque [N m]", "range [deg]"))
+        return (f"<p>{escape(Path(self.description).name)}: base {escape(self.base)}, {k.mass:.3f} kg, "
+                f"{len(self.joints)} joints; effects: {effects}</p><table><tr>{heads}</tr>{rows}</table>")
 
     def check_base(self, floating: bool) -> None:
         """InputError unless the base is a link of the model, and the root of its tree where it has to float."""

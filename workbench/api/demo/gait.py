@@ -12,6 +12,7 @@ from workbench.gait.ensemble import load_ensemble
 from workbench.gait.finalists import Screening
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import Optimized, OptimizeOptions, optimize, options_of, write_gait
+from workbench.gait.refine import RefineOptions
 from workbench.gait.request import Request
 from workbench.motion import load_motion
 from workbench.robot import RobotModel
@@ -24,11 +25,12 @@ SPEED = 0.10
 
 def demo_options() -> OptimizeOptions:
     """A look that takes seconds: few seeds, four robots of the ensemble in the search and twenty in the certificate, the
-    least that gives a 5th percentile; no finer step than half a millisecond."""
+    least that gives a 5th percentile; no finer step than half a millisecond; neither refined nor straightened."""
     first = options_of(1)
     return replace(first, budget=replace(first.budget, seeds=30, screened=5, generations=6, population=8, draws=4, enough=1),
-                   certify=replace(first.certify, draws=20, seconds=4.0, draw_seconds=2.0, variants=("2 ms", "1 ms", "0.5 ms")),
-                   screening=Screening((8,), certified=2))
+                   certify=replace(first.certify, draws=20, seconds=4.0, draw_seconds=2.0, variants=("2 ms", "1 ms", "0.5 ms"),
+                                   trimmed=0),
+                   screening=Screening((8,), certified=2), refine=RefineOptions(iterations=0))
 
 
 def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:

@@ -1,6 +1,6 @@
 """One question that many servos answer, one after the other.
 
-sync: Sync Read of protocol 2. fast: Fast Sync Read, answered by blocks of a single packet, each with a CRC of all before it.
+sync: Sync Read of protocol 2. fast: Fast Sync Read, answered by blocks of a single packet, each with a CRC of the packet so far.
 feetech: Feetech's Sync Read in frames of protocol 1. bulk: Bulk Read of protocol 1, which the MX series knows.
 """
 
@@ -37,7 +37,7 @@ def answer_length(kind: Kind, count: int) -> int:
 
 
 def reply_length(kind: Kind, servos: int, count: int) -> int:
-    """Bytes of all answers."""
+    """Bytes of the answers together."""
     return servos * answer_length(kind, count) + (FAST_HEAD if kind == "fast" else 0)
 
 

@@ -47,7 +47,7 @@ class Protocol2:
         return packet(servo, STATUS, bytes([number | (ALERT if error & _STATE else 0)]) + parameters)
 
     def block(self, so_far: bytes, servo: int, error: int, parameters: bytes) -> bytes:
-        """What a servo adds to the one packet in which all answer a Fast Sync Read, after what the others have put there."""
+        """A servo's part of the single packet that answers a Fast Sync Read. so_far: the packet up to there."""
         number = next((n for bit, n in _NUMBERS.items() if error & bit), 0)
         body = bytes([number | (ALERT if error & _STATE else 0), servo]) + parameters
         return body + crc16(so_far + body).to_bytes(2, "little")

@@ -102,8 +102,9 @@ def carried_on(found: Found, windows: Found, options: EvidenceOptions) -> Asks[F
         (r,) = yield [f.hypothesis]
         nothing = np.zeros((len(r), len(f.hypothesis.law.weights)))  # type: ignore[union-attr]
         at = yield from _measured(options, _State(f.hypothesis, r, nothing[:, :0], nothing))
-        at = yield from _fitted(found.region, options, at, options.law.iterations)
-        made.append(_as_fit(found.region, options, at))
+        region = found.region.correlated(min(found.region.likelihood.tau, found.region.correlation(r)))
+        at = yield from _fitted(region, options, at, options.law.iterations)
+        made.append(_as_fit(region, options, at))
     return _with(found, made, options)
 
 

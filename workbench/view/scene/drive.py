@@ -22,7 +22,7 @@ RAISED = 0.004
 
 
 class DriveScene:
-    """meshcat: where to; None: a server of its own while this object lives."""
+    """meshcat: where to; None: a server of its own while this object lives. place: x, y [m], heading [rad] of the robot shown."""
 
     def __init__(self, model: RobotModel, path: WayPath, discs: Sequence[Disc] = (), meshcat: Meshcat | None = None) -> None:
         self.meshcat = show_model(model, meshcat or open_meshcat())
@@ -34,7 +34,8 @@ class DriveScene:
             self._cylinder(f"way-points/{k + 1}", point, 0.012, PATH)
         for k, disc in enumerate(discs):
             self._cylinder(f"discs/{k + 1}", np.array([disc.x, disc.y]), disc.radius, DISC)
-        self._place(np.zeros(3))
+        self.place = np.zeros(3)
+        self._move(self.place)
 
     @property
     def url(self) -> str:
@@ -45,13 +46,14 @@ class DriveScene:
         """The end of a cycle: the robot as the cameras see it, its way so far, and the planned positions (N, 2) [m]."""
         if np.isfinite(seen.captured).all():
             self._seen.append(seen.captured)
-            self._place(seen.captured)
+            self._move(seen.captured)
         if len(self._seen) > 1:
             self._line("way", np.array(self._seen)[:, :2], SEEN)
         if len(planned) > 1:
             self._line("plan", planned, PLAN)
 
-    def _place(self, pose: Array) -> None:
+    def _move(self, pose: Array) -> None:
+        self.place = pose
         x, y, heading = pose
         self.meshcat.SetTransform("/robot", RigidTransform(RollPitchYaw(0.0, 0.0, heading), [x, y, self._height]))
 
