@@ -74,7 +74,7 @@ class Outcome:
 
 
 def variants(model: RobotModel) -> list[Variant]:
-    """Single effects, the same in all leg joints or of the whole robot, at sizes that occur on hobby robots (docs/effects.md)."""
+    """Single effects, in every leg joint or of the robot, at sizes that occur on small robots (docs/formats.md, section 7)."""
     legs = tuple(j for j in model.joints if len(j) == 3)
     body = model.base
     every: list[tuple[str, str, tuple[str, ...], Sequence[Sequence[float | tuple[float, float, float]]]]] = [
