@@ -13,16 +13,20 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: firmware demo test test-newest lint docs prove studies system clean
+.PHONY: firmware demo compiled test test-newest lint docs prove studies system clean
 
-demo: $(STAMP)
+demo: $(STAMP) compiled
 	$(BIN)/workbench demo
+
+# Compiled rollouts, once for each version on a machine: a minute, which each worker of the tests would spend otherwise.
+compiled: $(STAMP)
+	@$(BIN)/workbench doctor --compile > /dev/null
 
 # The robot's own program, with gcc-arm-none-eabi alone; image, sizes and the bound of its stack: runs/firmware.
 firmware:
 	@$(MAKE) --no-print-directory -C firmware
 
-test: lint
+test: lint compiled
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "not slow"
 
 # Types and the quick tests once more, with the newest Python here and the newest Drake, numpy and MuJoCo that pyproject.toml allows,

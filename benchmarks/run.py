@@ -13,6 +13,7 @@ from typing import Any
 from benchmarks import compiled, drives, engine, reader
 from benchmarks.diagnose_time import diagnose_time
 from benchmarks.figure import Figure
+from benchmarks.servo_logs import servo_log_rollouts_against_mujoco
 from benchmarks.sysid import fit_against_mujoco_sysid
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
@@ -44,6 +45,7 @@ QUICK = Size(duration=0.1, walk=0.1, turns=1, finest=5e-4, frames=2000, readings
 LOG, LOG_QUICK, LOG_DIAGNOSED = 4.0, 0.3, 2.4
 """Seconds of motion in the logs that are fitted, and in the one that is diagnosed."""
 TURNS = 2
+MODELS, LOG_TURNS = 50, 5
 
 
 def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
@@ -52,7 +54,7 @@ def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what
     figures = _measure(QUICK if quick else Size(), progress) + _fits(quick, progress)
     warnings = ["quick: too little was measured for the figures to mean anything"] if quick else []
     if load > 1:
-        warnings.append(f"load average {load:.1f} at the start: other work falsifies what is measured in wall time, the batch "
+        warnings.append(f"load average {load:.1f} at the start: other work distorts the figures in wall time, the batch "
                         "and the reader")
     return {"format": 1, "quick": quick, "machine": _machine(load), "versions": _versions(), "seed": SEED, "warnings": warnings,
             "figures": {f.name: f.to_json() for f in figures}, "seconds": time.perf_counter() - began}
@@ -84,8 +86,11 @@ def _measure(size: Size, progress: Callable[[str], None]) -> list[Figure]:
 def _fits(quick: bool, progress: Callable[[str], None]) -> list[Figure]:
     progress("fit against MuJoCo's system identification")
     fit = fit_against_mujoco_sysid(LOG_QUICK, 1, SEED, iterations=1) if quick else fit_against_mujoco_sysid(LOG, TURNS, SEED)
+    progress("rollouts of a servo log against MuJoCo's")
+    logs = (servo_log_rollouts_against_mujoco(LOG_QUICK, 2, 1, SEED) if quick
+            else servo_log_rollouts_against_mujoco(LOG, MODELS, LOG_TURNS, SEED))
     progress("where a diagnosis spends its time")
-    return [fit, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
+    return [fit, logs, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
 
 
 def _machine(load: float) -> dict[str, Any]:

@@ -15,7 +15,6 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,28 +49,12 @@ WITHIN_POINT = (5.0, 5.0)
 """[deg], [cm]."""
 
 
-@dataclass(frozen=True)
-class Robot:
-    """open_turn: how far it turned in 2 m open loop [deg]."""
-
-    model: RobotModel
-    open_turn: float
-
-
-def concealed(family: GaitFamily, step_map: StepMap, count: int, folder: Path, progress: Callable[[str, float | None], None]
-              ) -> list[Robot]:
-    """Drawn robots that turn by TURNS open loop."""
-    found: list[Robot] = []
-    for k, model in enumerate(load_ensemble().draws(family.machine.model, 5 * count, SEED, folder)):
-        progress(f"drawn robot {k + 1}, open loop", len(found) / count)
-        path = WayPath(LINE)
-        run = drive(SimulatedWalk(family, model, Cameras(), k), path, CycleController(path, step_map, family.period), 100, False)
-        turned = math.degrees(np.unwrap(run.poses[:, 2])[-1])
-        if run.reason != "fell" and TURNS[0] <= abs(turned) <= TURNS[1]:
-            found.append(Robot(model, turned))
-        if len(found) == count:
-            break
-    return found
+def open_loop(family: GaitFamily, step_map: StepMap, model: RobotModel, seed: int) -> float | None:
+    """How far a robot turns in 2 m without steering [deg]; None where it falls or turns by less or more than TURNS."""
+    path = WayPath(LINE)
+    run = drive(SimulatedWalk(family, model, Cameras(), seed), path, CycleController(path, step_map, family.period), 100, False)
+    turned = math.degrees(np.unwrap(run.poses[:, 2])[-1])
+    return turned if run.reason != "fell" and TURNS[0] <= abs(turned) <= TURNS[1] else None
 
 
 def numbers_of(run: Driven, period: float) -> dict[str, Any]:
@@ -115,27 +98,33 @@ def planning_time(step_map: StepMap, options: DriveOptions, plans: int = 200) ->
 
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
-    """Draws the robots, steers each along each path by both laws, and counts."""
+    """Draws the robots, steers each along each path by both laws, and counts; the page is written after each robot."""
     model = puppy_model()
     family = load_family(GAIT, model)
     step_map = fit_step_map(family, model, SEED, MapOptions(cycles=12, rollouts=2) if quick else MapOptions())
     count = 1 if quick else ROBOTS
-    runs: list[dict[str, Any]] = []
+    milliseconds = 1000 * planning_time(step_map, DriveOptions(), 20 if quick else 200)
+    runs, said = list[dict[str, Any]](), ""
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
-        robots = concealed(family, step_map, count, Path(folder), progress)
-        for k, robot in enumerate(robots):
-            row: dict[str, Any] = {"open loop deg": robot.open_turn}
+        for k, robot in enumerate(load_ensemble().draws(model, 5 * count, SEED, Path(folder))):
+            progress(f"drawn robot {k + 1}, open loop", len(runs) / count)
+            turned = open_loop(family, step_map, robot, k)
+            if turned is None:
+                continue
+            row: dict[str, Any] = {"drawn": k + 1, "open loop deg": turned}
             for name, points in PATHS.items():
                 for law in LAWS:
-                    progress(f"robot {k + 1} of {len(robots)}, {name}, {law}", k / len(robots))
+                    progress(f"robot {len(runs) + 1} of {count}, {name}, {law}", len(runs) / count)
                     path = WayPath(points)
                     controller = CycleController(path, step_map, family.period, DriveOptions(law=law))  # type: ignore[arg-type]
-                    walk = SimulatedWalk(family, robot.model, Cameras(lost=LOST), SEED + k)
+                    walk = SimulatedWalk(family, robot, Cameras(lost=LOST), SEED + k)
                     row[f"{name}, {law}"] = numbers_of(drive(walk, path, controller, 150), family.period)
             runs.append(row)
-    milliseconds = 1000 * planning_time(step_map, DriveOptions(), 20 if quick else 200)
-    return publish(out, model, _report(model, runs, milliseconds, step_map),
-                   {"robots": runs, "ms a plan": milliseconds, "step map": dict(vars(step_map))}, {})
+            said = publish(out, model, _report(model, runs, milliseconds, step_map),
+                           {"robots": runs, "ms a plan": milliseconds, "step map": dict(vars(step_map))}, {})
+            if len(runs) == count:
+                break
+    return said
 
 
 def _report(model: RobotModel, runs: list[dict[str, Any]], milliseconds: float, step_map: StepMap) -> Report:

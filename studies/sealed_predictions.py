@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,13 +23,13 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from studies.common import publish, run_study, sign
-from studies.concealed_effects.catalogue import possible
-from studies.concealed_effects.conceal import Bench, NoneFoundError, conceal
+from studies.concealed_effects.catalogue import TIES, draw, possible
 from studies.concealed_effects.robots import puppy
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import filmed_takes
 from studies.other_engine.as_take import mujoco_take
 from studies.other_engine.make_session import random_camera, write_recordings
+from studies.other_engine.player import Rollout
 from workbench.compare.session import load_session
 from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import PUPPY_CLAIM
@@ -43,7 +44,7 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.report.page import Provenance, Report, Section, Table, Text
 
-ROBOTS, CYCLES = 20, 10
+ROBOTS, CYCLES, TRIES = 20, 10, 20
 SLOWEST = 0.02
 """Speed [m/s] below which an error is counted by this and not by the speed itself."""
 TROT = GaitShape("trot", (1, 1), 8, 2.0, stride=0.04, duty=0.6, lift=0.02, crouch=0.045, lead=1.0)
@@ -99,22 +100,29 @@ def predicted(model: RobotModel, motions: Mapping[str, Played]) -> dict[str, Wen
 
 
 def robot(vault: Vault, k: int, folder: Path) -> RobotModel:
-    """Draws the k-th robot, writes its session into `folder`, and seals its effects. Returns the nominal model."""
-    for attempt in range(20):
+    """Draws the k-th robot, one that stays upright, writes its session into `folder`, and seals its effects. Returns the nominal
+    model."""
+    for attempt in range(TRIES):
         rng = np.random.default_rng([vault.seed, k, attempt])
         made = puppy(rng)
-        model, takes = made.model(folder.parent / "robot.sdf"), [t for t in filmed_takes(rng) if not t.predict]
-        names = [str(n) for n in rng.permutation(possible(made, False))[:2]]
-        try:
-            effects = conceal(Bench(made, model, takes), names, False, rng)
-        except NoneFoundError:
+        model, takes = made.model(folder), [t for t in filmed_takes(rng) if not t.predict]
+        names = rng.permutation(possible(made, False))[:2]
+        effects = tuple(draw(str(n), rng, made).at(float(rng.uniform())) for n in names)
+        if frozenset(e.effect for e in effects) in TIES or set(effects[0].where) & set(effects[1].where):
             continue
-        hidden = replace(model, effects=effects)
-        write_recordings(folder, model, hidden, takes, random_camera(rng), rng)
-        told = json.dumps([{"effect": e.effect, "where": list(e.where), "parameters": dict(e.parameters)} for e in effects])
-        vault.seal(folder.name, {"effects.json": told})
-        return model
-    raise RuntimeError(f"robot {k + 1}: no two effects that show")
+        shutil.rmtree(folder, ignore_errors=True)
+        played = write_recordings(folder, model, replace(model, effects=effects), takes, random_camera(rng), rng)
+        if all(_upright(run) for _, run, _, _ in played):
+            told = json.dumps([{"effect": e.effect, "where": list(e.where), "parameters": dict(e.parameters)} for e in effects])
+            vault.seal(folder.name, {"effects.json": told})
+            return model
+    raise RuntimeError(f"robot {k + 1}: none of {TRIES} draws stays upright")
+
+
+def _upright(run: Rollout) -> bool:
+    root = run.model.body(1).name
+    _, R = run.poses(run.time[-1:], (root,))[root]
+    return bool(R[0, 2, 2] > 0.8)
 
 
 def hidden_robot(vault: Vault, name: str, model: RobotModel) -> RobotModel:

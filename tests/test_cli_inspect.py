@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.command import refused, succeeds
+from tests.command import main, refused, succeeds
 from tests.gap_sessions import MOTION, record_arm, write_session
 from tests.shared_data import shared
 from workbench.robot import data_file
@@ -36,7 +36,9 @@ def test_model_by_url(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_session_and_what_it_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = _inspected(capsys, write_session(tmp_path))
+    session = write_session(tmp_path)
+    assert main(["inspect", str(session), "--json"]) == 2  # its only take is no recording
+    said = json.loads(capsys.readouterr().out)
     assert (said["kind"], said["details"]["takes"], said["joints"]) == ("session", ["wave"], ["one", "three", "two"])
     assert _inspected(capsys, tmp_path / "servo.yaml")["kind"] == "servo_constants"
     assert _inspected(capsys, tmp_path / "robot.sdf")["details"]["base"] == "fixed to the world"

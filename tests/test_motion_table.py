@@ -105,7 +105,7 @@ def test_written_and_read_again(walk: Motion, tmp_path: Path) -> None:
     ("time,flm\n0,1\n1,2\n1,3\n", "row 3: time 1 s does not come after 1 s"),
     ("time,flm\n1,1\n0,2\n", "row 2: time 0 s"),
     ("flm,flt\n0,1\n", "'time'"),
-    ("time,flm,flm\n0,1,1\n", "'flm' stands there twice"),
+    ("time,flm,flm\n0,1,1\n", "'flm' is given twice"),
     ("0,1,2\n1,1,2\n", "line 1: without a header, expected time and 15 joints, found 3 cells"),
 ])
 def test_bad_tables_are_one_readable_line(text: str, message: str, tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_moving_speeds_of_their_own_survive_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(("header", "said"), [
-    ("time,a,b,speed.a", "column 'speed.b': expected speed.JOINT of all joints or of none"),
+    ("time,a,b,speed.a", "column 'speed.b': expected speed.JOINT for every joint or for none"),
     ("time,a,speed.a,speed.c", "column 'speed.c'"),
 ])
 def test_moving_speeds_are_of_all_joints_or_of_none(tmp_path, header, said):

@@ -89,7 +89,7 @@ def test_joint_log_written_and_read_back(tmp_path):
 @pytest.mark.parametrize(("old", "new", "message"), [
     ("goal.tail,", "gaol.tail,", "unknown column 'gaol.tail'"),
     ("goal.tail,position.tail", "goal.tail,position.neck", "column 'position.neck' without 'goal.neck'"),
-    ("goal.tail,position.tail", "goal.tail,goal.tail", "column 'goal.tail' stands there twice"),
+    ("goal.tail,position.tail", "goal.tail,goal.tail", "column 'goal.tail' is given twice"),
     ("0.12,20", "0.11,20", "line 4: time 0.11 does not follow"),
     ("0.12,20", "0.12,2O", "line 4, column 2: expected a number, got '2O'"),
     ("-1,11.0,0,", "-1,11.0,off,", "line 4, enabled.flm: expected 1 or 0, got 'off'"),

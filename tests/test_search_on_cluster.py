@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def processes(items: Sequence[int]) -> list[tuple[int, int]]:
     return [(os.getpid(), item) for item in items]
 
 
-def test_blocks_go_to_workers_and_come_back_in_order(cluster):
+def test_blocks_go_to_workers_and_come_back_in_order(cluster: None) -> None:
     assert on_cluster()
     done = list(in_blocks(processes, range(7), 2))
     assert [item for _, item in done] == list(range(7))
@@ -48,7 +49,7 @@ def test_blocks_go_to_workers_and_come_back_in_order(cluster):
 
 
 @pytest.mark.slow
-def test_servo_logs(tmp_path, cluster):
+def test_servo_logs(tmp_path: Path, cluster: None) -> None:
     session = record(tmp_path)
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
     takes, _ = read_takes(session)
@@ -64,7 +65,7 @@ def test_servo_logs(tmp_path, cluster):
 
 
 @pytest.mark.slow
-def test_gaits(cluster):
+def test_gaits(cluster: None) -> None:
     model = puppy_model()
     walks = [load_motion(data_file("robotis_walk.csv"), model).commands(n) for n in (1, 2, 3)]
     jobs = [Job(model, SEARCH, walk, 0.1 + 0.05 * k, 0.03) for k, walk in enumerate(walks)]

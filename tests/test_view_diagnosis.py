@@ -163,7 +163,7 @@ def test_a_vector_has_a_row_for_each_component_in_a_unit_that_suits_the_largest(
     (Unexplained(("brm",), 0.567, 0.206, "deg", Dependence("sway", "brm", "angle", 0.55)),
      ["joint brm", "sway", "0.567 deg", "2.8×", "partly with its angle (0.55)"]),
     (Unexplained((), 0.00546, 0.00178, "m", Dependence("walk", "forward")),
-     ["how far the body goes", "walk", "5.46 mm", "3.1×", "not with time"]),
+     ["how far the body moves", "walk", "5.46 mm", "3.1×", "not with time"]),
     (Unexplained(("flm",), 1.0, 0.5, "deg", Dependence("walk", "flm~z", "time", 0.8)),
      ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "closely with time (0.80)"]),
     (Unexplained(("frb",), 0.6, 0.2, "deg", ParameterDrift("com_shift", ("frb_link",), "offset", 1.0, 2.0, "m")),
@@ -180,7 +180,7 @@ def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(mo
     told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
     assert all("The tether force is a pull straight down, with the weight of 76 g that does" in page for page in told.values())
-    assert ["still off by more than noise" in page for page in told.values()] == [False, True]
+    assert ["still exceeds noise" in page for page in told.values()] == [False, True]
 
 
 def test_reasons_name_effects_as_people_do() -> None:

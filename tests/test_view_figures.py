@@ -14,7 +14,7 @@ from workbench.compare.footfalls import FootPhases, force_phases
 from workbench.compare.results import Channel
 from workbench.files import InputError
 from workbench.recording.take import Take
-from workbench.robot import RobotModel, ServoConstants
+from workbench.robot import RobotModel, ServoConstants, data_file
 from workbench.view import figures
 from workbench.view.figures.stance import intervals
 from workbench.view.figures.style import NOISE, RECORDED, SIMULATED, STANCE
@@ -214,3 +214,20 @@ def test_a_robot_left_far_behind_is_told_and_does_not_shrink_the_other(model: Ro
     alone, both = (figures.film_strip(model, ahead, other).axes[-1] for other in (None, behind))
     assert np.ptp(both.get_xlim()) <= 2.5 * np.ptp(alone.get_xlim())
     assert [t.get_text() for t in both.texts] == ["\u2190 300 cm"]
+
+
+def test_the_film_strip_of_an_arm_without_feet_shows_all_of_it_at_every_instant() -> None:
+    """Its last link has no joint at its end and no foot."""
+    import workbench
+
+    arm = workbench.load_model(data_file("tutorial_arm"))
+    time = np.linspace(0, 1, 21)
+    q = np.outer(np.sin(3 * time), np.ones(len(arm.joints)))
+    take = Take(name="arm", time=time, joints=arm.joints, q=q, source="simulation", base="fixed", starts_at=0.0)
+    for axes in figures.film_strip(arm, take, instants=4).axes:
+        (sticks,) = axes.collections
+        points = np.concatenate(sticks.get_segments())
+        assert len(sticks.get_segments()) == len(arm.joints) + 1
+        for of, (low, high) in zip(points.T, (axes.get_xlim(), axes.get_ylim())):
+            assert low <= of.min() <= of.max() <= high
+        assert np.ptp(points, axis=0).max() > 15  # the arm is 0.3 m long

@@ -80,6 +80,15 @@ def test_a_base_that_nobody_followed_stands_clear_of_the_floor(model: RobotModel
     np.testing.assert_allclose(ghost.base_p[0], [0, 0, 0.1], atol=1e-9)
 
 
+def test_a_ghost_whose_body_was_not_recorded_goes_with_the_simulated_one(model: RobotModel) -> None:
+    free = swing(model)
+    walked = play(free, model, TIME)
+    log = replace(swing(model), p_WB=None, quat_WB=None, source="log")
+    np.testing.assert_array_equal(play(log, model, TIME, like=(free, walked)).base_p, walked.base_p)
+    assert names_of(free, log) == ("simulated", "measured joints, body not recorded")
+    assert names_of(free, replace(free, source="log")) == ("simulated", "measured")
+
+
 def test_a_robot_on_a_stand_is_shown_just_above_the_floor(model: RobotModel) -> None:
     free = swing(model)
     hung = replace(free, base="fixed", p_WB=np.tile([0, 0, 1.3], (len(free), 1)))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from workbench.api.gaits import GaitResult, optimize
-    from workbench.api.robots import load_model
+    from workbench.api.robots import load_model, save_model
     from workbench.api.sessions import (
         ComparisonResult,
         DiagnoseOptions,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from workbench.gait.request import Request
     from workbench.motion import Motion, load_motion
     from workbench.recording import Take
-    from workbench.robot import ConfigureParser, EffectSpec, RobotModel, save_model
+    from workbench.robot import ConfigureParser, EffectSpec, RobotModel
     from workbench.simulation import AddServos, MakeStation, Simulation, SimulationConfig
     from workbench.view.scene.live import show
 
@@ -44,7 +44,7 @@ _HOME = {
     "SimulationConfig": "workbench.simulation", "Take": "workbench.recording", "compare_session": "workbench.api.sessions",
     "diagnose": "workbench.api.sessions", "load_model": "workbench.api.robots", "load_motion": "workbench.motion",
     "load_session": "workbench.compare.session", "optimize": "workbench.api.gaits", "predict": "workbench.api.sessions",
-    "save_model": "workbench.robot", "show": "workbench.view.scene.live",
+    "save_model": "workbench.api.robots", "show": "workbench.view.scene.live",
 }
 """Which module each name is loaded from."""
 

@@ -1,4 +1,4 @@
-/* What the chip does for the core. */
+/* Functions that the chip provides to the core. */
 #ifndef CHIP_H
 #define CHIP_H
 

@@ -88,7 +88,7 @@ void bus_received_interrupt(void) {
     }
 }
 
-/* The core waits no longer: what has come so far is the answer. Called from the main loop; the interrupt may have been first. */
+/* The core stops waiting: the bytes received so far are the answer. Called from the main loop; the interrupt may have been first. */
 void bus_stop_waiting(void) {
     DMA1_CCR5 = 0;
     if (!robot.bus.busy) return;

@@ -1,4 +1,4 @@
-/* Vectors, memory, and what the compiler itself may call. */
+/* Vectors, memory, and functions that the compiler may call. */
 #include "../core/bytes.h"
 #include "chip.h"
 #include "registers.h"
@@ -31,7 +31,7 @@ __attribute__((used)) static void begin(void) {
 /* Whatever stack the loader has left. */
 __attribute__((naked)) static void reset(void) { __asm volatile("ldr r0, =stack_top\n msr msp, r0\n b begin\n .ltorg"); }
 
-/* A fault stops everything; the watchdog then resets, and the robot stands still and says so. */
+/* A fault stops everything; the watchdog then resets the chip, and the robot stands still and reports it. */
 static void stop(void) {
     for (;;) {
     }

@@ -50,7 +50,7 @@ static void take(struct robot *r) {
     if (!b->whole) b->got = 0;
 }
 
-/* Called where the bus is free: what was under way when the bridge began, or the packet before, is over. */
+/* Called when the bus is free: any earlier packet has ended. */
 void bridge_send(struct robot *r) {
     struct bridge *b = &r->bridge;
     if (!b->whole) {

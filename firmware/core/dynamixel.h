@@ -24,7 +24,7 @@ uint32_t dxl_sync_goals(uint8_t *out, const uint8_t *table, const uint16_t *goal
 /* Whether `n` bytes are the whole answer of `id` with `count` parameters (from in + 5) and nothing else. */
 enum dxl_answer dxl_status(const uint8_t *in, uint32_t n, uint8_t id, uint32_t count);
 
-/* Complement of the sum of all but header and checksum of a packet of `n` bytes. */
+/* Complement of the sum of a packet's `n` bytes, without header and checksum. */
 uint8_t dxl_sum(const uint8_t *packet, uint32_t n);
 
 #endif

@@ -15,8 +15,8 @@
 #define POSE_GUARD_MS 4u      /* no read is started so shortly before a pose: time-out and one tick */
 #define SWEEP_MS 24u          /* all servos are read at least this often: 41.7 Hz */
 #define TRIES 2u              /* of one read, before the servo counts as missed in this round */
-#define CHECK_TRIES 5u        /* of one read before torque goes on */
-#define CHECK_SPREAD 6u       /* counts: two readings of a joint at rest agree within this before torque goes on */
+#define CHECK_TRIES 5u        /* of one read before torque is switched on */
+#define CHECK_SPREAD 6u       /* counts: two readings of a joint at rest agree within this before it gets torque */
 
 #define BOOT_MS 2000u         /* after a reset servos may be starting themselves: an XC-330 takes 0.4 s, and none answers meanwhile */
 
@@ -29,7 +29,7 @@
 #define ALARM_READINGS 3u     /* readings one after another that say the same before it is believed */
 #define HOT_CELSIUS 65u       /* the servo itself gives up at 70 */
 #define LOW_DECIVOLT 96u      /* 3.2 V a cell of the LiPo pack under load */
-#define LOW_ROUNDS 36u        /* rounds in which most servos say so: 0.9 s, 2 s are allowed; a walk's sag is shorter */
+#define LOW_ROUNDS 36u        /* rounds in which most servos read low: 0.9 s, 2 s are allowed; a walk's sag is shorter */
 #define DEAD_DECIVOLT 65u     /* below 6 V a servo is off; the supply has gone */
 #define STRAY_BYTES 40u       /* bytes nobody asked for in a window; one late answer has at most 56, but no second follows */
 #define STRAY_WINDOW_MS 25u
@@ -41,13 +41,13 @@
 #define RAMP_SPARE_MS 2000u   /* beyond the time that a ramp should take */
 #define RAMP_TOLERANCE 30u    /* counts, 9 degrees: droop under the robot's own weight is 2 degrees */
 
-#define SEAT_COUNTS 14        /* 4 degrees: what a joint is told more than neutral before it is let down onto its droop */
+#define SEAT_COUNTS 14        /* 4 degrees beyond neutral, the goal of a joint before it is let down onto its droop */
 #define SEAT_MS 300u          /* for each of the two; friction lets go slowly */
 
 #define RAMP_TORQUE 512u      /* half of full torque until neutral is reached for the first time: whatever is caught is not crushed */
 #define IDLE_MS 300000u       /* held for so long without being used, torque goes: servos that hold get hot */
 
-#define OFF_AGAIN_MS 12u      /* torque off is told again to those that are not known to have heard it */
+#define OFF_AGAIN_MS 12u      /* period of torque off, sent again to servos that may not have received it */
 #define FRAME_MS 100u         /* a frame that stops for so long is over: a wrong length would swallow those that follow */
 
 #define BUTTON_MS 20u         /* a button is pressed once it has been so for this long */

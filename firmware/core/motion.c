@@ -13,7 +13,7 @@ void release(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) r->servo[j].off = false;
 }
 
-/* What this joint's torque limit should be now: its own, or on the first way to neutral less. */
+/* The joint's torque limit: its own, or less on the first way to neutral. */
 uint16_t torque_limit(const struct robot *r, uint32_t joint) {
     uint16_t own = r->servo[joint].torque_limit;
     return r->gentle && own > RAMP_TORQUE ? RAMP_TORQUE : own;
@@ -59,8 +59,8 @@ static uint32_t speed_of_way(uint32_t way, uint32_t dwell_ms) {
     return (a_second * 1000u + SPEED_MILLI - 1u) / SPEED_MILLI;
 }
 
-/* What is sent where the table says 0, "at once": a servo that is told so and is not there goes as fast as it can. Instead its way
-   from the last goal takes the pose's dwell; without one it goes on at the speed that it had, as it may still be under way. */
+/* Replaces a table's speed 0 ("at once"), at which a servo would move as fast as it can. The way from the last goal takes the pose's
+   dwell; without such a way the servo keeps its speed, as it may still be moving. */
 static uint16_t speed_to_send(const struct robot *r, uint32_t pose, uint32_t j, uint16_t from) {
     const uint8_t *t = playing(r);
     uint32_t speed = table_speed(t, pose, j), way = distance(table_goal(t, pose, j), from);

@@ -1,4 +1,4 @@
-/* What is done about what is wrong; the table stands in docs/robot.md, and a test goes through its cells. */
+/* Reactions to faults, as listed in docs/robot.md; a test goes through the cells of that table. */
 #include "robot.h"
 
 enum reaction reaction_of(uint8_t reason) {
@@ -23,7 +23,7 @@ enum reaction reaction_of(uint8_t reason) {
     }
 }
 
-/* What a servo that is still starting looks like. */
+/* How a servo that is still starting appears. */
 static bool nobody_hears(uint8_t reason) {
     return reason == REASON_SILENT || reason == REASON_GARBLED || reason == REASON_DEAD_SUPPLY || reason == REASON_BABBLE;
 }

@@ -1,4 +1,4 @@
-/* Servos are read in turn, all the time; before torque goes on, twice and whole. */
+/* Servos are read in turn, all the time; before they get torque, twice and completely. */
 #include "robot.h"
 
 #define FIRST_READ DXL_TORQUE
@@ -63,8 +63,8 @@ static void verify_goal(struct robot *r, uint32_t j, const uint8_t *ram) {
     r->send_goals = true;
 }
 
-/* Margins, slopes and punch are as they were when torque went on, and the torque limit is what it should be now; what a broken packet
-   or the first ramp has changed is put back. */
+/* Restores margins, slopes and punch as they were when torque was switched on, and the present torque limit, where a broken packet or
+   the first ramp has changed them. */
 static void restore_settings(struct robot *r, uint32_t j, const uint8_t *ram) {
     const uint8_t *kept = r->servo[j].settings;
     uint8_t id = table_id(playing(r), j);

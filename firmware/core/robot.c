@@ -1,4 +1,4 @@
-/* States, and what is done next. */
+/* States and their transitions. */
 #include "robot.h"
 
 void robot_init(struct robot *r, const uint8_t *built_in, uint32_t size, uint8_t cause) {

@@ -21,7 +21,7 @@ enum state {
     STATE_BRIDGE   /* the PC talks to the servos through us */
 };
 
-/* Why the state is what it is. */
+/* The reason for a state. */
 enum reason {
     REASON_NONE, REASON_POWER_ON, REASON_RESET_PIN, REASON_WATCHDOG, REASON_SOFTWARE, REASON_BROWN_OUT, REASON_BUTTON,
     REASON_REMOTE, REASON_LINK, REASON_ENDED, REASON_SILENT, REASON_GARBLED, REASON_WRONG_MODEL, REASON_OVERLOAD, REASON_HOT,
@@ -114,7 +114,7 @@ void robot_init(struct robot *r, const uint8_t *built_in, uint32_t size, uint8_t
 /* To be called after every wake; `now` [ms]. */
 void robot_step(struct robot *r, uint32_t now);
 
-/* --- what the core's files share --- */
+/* --- shared by the core's files --- */
 
 static inline bool torque_on(const struct robot *r) { return r->state >= STATE_RAMP && r->state <= STATE_YIELD; }
 /* Servos that do not answer may still be starting. */

@@ -1,4 +1,4 @@
-/* The binary table: what is played. Its layout stands in docs/robot.md; nothing in it is trusted before it is checked. */
+/* The binary table that is played. docs/robot.md defines its layout; it is checked before it is used. */
 #ifndef TABLE_H
 #define TABLE_H
 
@@ -9,7 +9,7 @@
 #define TABLE_HEAD 16u
 #define TABLE_SECTIONS_HEAD 20u /* of version 2, with the sections' sizes */
 #define TABLE_JOINT 12u
-#define TABLE_STOPS 1u /* flag: stops after its cycles where no other table has come; else it goes on */
+#define TABLE_STOPS 1u /* flag: stops after its cycles unless another table has come; without it, repeats */
 
 enum table_fault {
     TABLE_OK, TABLE_SHORT, TABLE_MAGIC, TABLE_VERSION, TABLE_JOINTS, TABLE_POSES, TABLE_FLAGS, TABLE_SIZE, TABLE_BUS_ID,

@@ -1,4 +1,4 @@
-/* What the PC is told: state and reason when they change, and a log of all joints after each round. */
+/* Messages to the PC: state and reason when they change, and a log of the joints after each round. */
 #include "robot.h"
 
 void tell_state(struct robot *r) {

@@ -21,7 +21,7 @@ struct upload {
 
 void upload_init(struct upload *u, const uint8_t *built_in);
 
-/* Takes a BEGIN, DATA or END frame of link `link`. Returns UPLOAD_OK, or what is wrong; END is answered by upload_step. */
+/* Takes a BEGIN, DATA or END frame of link `link`. Returns UPLOAD_OK or an error; END is answered by upload_step. */
 uint8_t upload_frame(struct upload *u, const struct frame_reader *f, uint8_t link, uint32_t now);
 
 /* A little of the work that is left; true when an END has its answer, in *result. */

@@ -1,4 +1,4 @@
-/* libFuzzer: any bytes as a servo's answer, a remote's word, a frame; what is accepted is what it says it is. */
+/* libFuzzer: any bytes as a servo's answer, a remote's word, a frame; anything accepted is valid. */
 #include <stdlib.h>
 
 #include "../core/crc.h"

@@ -164,7 +164,7 @@ static void one(struct sim *sim, struct script *s) {
 
 enum { FRESH, RESET, NEUTRAL, PLAYING, LIMP, BRIDGED, BROKEN, BEGINNINGS };
 
-/* Where a script begins; made once, as a walk up to there takes far longer than what follows. */
+/* Where a script begins; made once, as the walk up to there takes far longer than the script. */
 static void begin(struct sim *sim, uint32_t how) {
     static struct sim kept[BEGINNINGS];
     static bool made[BEGINNINGS];

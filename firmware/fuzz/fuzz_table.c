@@ -1,10 +1,10 @@
-/* libFuzzer: any bytes as a table, with and without the sum made right; what is accepted can be read to its last pose. */
+/* libFuzzer: any bytes as a table, with and without the sum made right; an accepted table can be read to its last pose. */
 #include <stdlib.h>
 
 #include "../core/crc.h"
 #include "../core/table.h"
 
-/* Makes a table of any bytes: as many joints and poses as they hold, all sound but for what the number of joints itself spoils. */
+/* Makes a table of any bytes: as many joints and poses as they hold, valid except where the number of joints is not. */
 static size_t mend(uint8_t *t, size_t size) {
     uint32_t n = t[5];
     size_t fixed = TABLE_HEAD + TABLE_JOINT * n + 4u, each = 4u + 4u * n;

@@ -1,4 +1,4 @@
-/* The table of reactions: one fault at a random moment of a walk, and what the robot did about it. */
+/* The table of reactions: one fault at a random moment of a walk, and the robot's reaction. */
 #include "cells.h"
 
 #include "../core/crc.h"

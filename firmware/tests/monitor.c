@@ -1,7 +1,7 @@
 #include "monitor.h"
 
 #define AFTER_STOP 50u      /* ms until a stop or release has to be obeyed */
-#define FOUND 400u          /* ms until what is wrong with a servo has to be noticed */
+#define FOUND 400u          /* ms until a servo's fault has to be noticed */
 #define LET_GO 12000u       /* ms until torque has to be off then: a ramp turns 150 deg in 5 s, and is given 2 s more */
 #define STARTING 2400u      /* ms after a reset in which servos that start are waited for */
 #define RAMP 45u            /* moving speed of a ramp, 30 deg/s */

@@ -42,7 +42,7 @@ struct monitor {
 
 void monitor_begin(struct monitor *m, uint32_t joints, bool power_on);
 
-/* One millisecond has gone by; `joint` is up to date. asked: what has reached the robot in it. */
+/* One millisecond has gone by; `joint` is up to date. asked: requests that reached the robot in it. */
 void monitor_look(struct monitor *m, uint32_t ms, uint32_t asked);
 
 #endif

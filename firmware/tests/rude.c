@@ -7,7 +7,7 @@ static bool stale_answer;
 
 static struct sim_servo *victim(uint32_t k) { return &rude.sim.servo[(rude.run->k + k) % rude.sim.joints]; }
 
-/* --- what goes wrong --- */
+/* --- faults --- */
 
 static void reset(uint32_t cause) {
     sim_reset(&rude.sim, rude.run->table, rude.run->size, cause);

@@ -1,4 +1,4 @@
-/* Rude partners: whole sessions in which the k-th transaction on the servo bus, and what is about it, goes wrong. */
+/* Rude partners: whole sessions in which the k-th transaction on the servo bus, or something at that time, fails. */
 #ifndef RUDE_H
 #define RUDE_H
 

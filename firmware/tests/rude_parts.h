@@ -1,4 +1,4 @@
-/* What the files of the rude sessions share. */
+/* Shared by the files of the rude sessions. */
 #ifndef RUDE_PARTS_H
 #define RUDE_PARTS_H
 
@@ -20,7 +20,7 @@ extern const struct step rude_steps[RUDE_SESSIONS][13];
 
 static inline uint32_t rude_ms(void) { return (uint32_t)(rude.sim.us / 1000u); }
 
-void rude_order(uint8_t type, uint32_t what);     /* a frame of the PC; what the monitor makes of it */
+void rude_order(uint8_t type, uint32_t what);     /* a frame of the PC; its meaning to the monitor */
 void rude_remote(uint32_t buttons, uint32_t what);
 void rude_press(bool down);
 void rude_act(const struct step *s);

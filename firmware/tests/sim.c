@@ -116,7 +116,7 @@ static void sync_write(struct sim *s, const uint8_t *p, uint32_t parameters) {
             if (s->servo[j].powered && s->us / 1000u >= s->servo[j].boots_until && s->servo[j].table[DXL_ID] == p[5 + k]) store(s, &s->servo[j], p[5], p + 6 + k, n);
 }
 
-/* What the servos make of the packet that was sent. */
+/* The servos' reaction to the packet that was sent. */
 static void hear(struct sim *s) {
     uint8_t p[BUS_BYTES];
     uint32_t n = s->r.bus.tx_length;

@@ -1,5 +1,5 @@
-/* The core and its plain servos on another emulated Cortex-M3 (QEMU's mps2-an385): what is sent to the servos goes to its UART, in hex.
-   The same file built for the PC prints the same; so the cross compiler's code does what the native tests have tested. */
+/* The core and its plain servos on another emulated Cortex-M3 (QEMU's mps2-an385): packets to the servos go to its UART, in hex.
+   The same file built for the PC prints the same; so the cross compiler's code behaves as in the native tests. */
 #include "sim.h"
 
 extern const uint8_t witness_table[], witness_table_end[];

@@ -5,11 +5,24 @@ from pathlib import Path
 
 from benchmarks.arm import arm_sdf
 from workbench.device.bus import Bus
-from workbench.device.virtual import AX12A, SECOND, STS3215, XL330, XL430, Clock, RampBody, ServoBus, VirtualPort, VirtualServo
+from workbench.device.virtual import (
+    AX12A,
+    MX28,
+    SECOND,
+    STS3215,
+    XL330,
+    XL430,
+    Clock,
+    RampBody,
+    ServoBus,
+    VirtualPort,
+    VirtualServo,
+)
 from workbench.robot import RobotModel, puppy_model
 from workbench.robot.servo_profile_file import servo_profile
 
-FAMILIES = {"AX-12A": (AX12A, 11.1), "XL-330": (XL330, 5.0), "XL-430": (XL430, 11.1), "STS3215": (STS3215, 7.4)}
+FAMILIES = {"AX-12A": (AX12A, 11.1), "XL-330": (XL330, 5.0), "XL-430": (XL430, 11.1), "STS3215": (STS3215, 7.4),
+            "MX-28": (MX28, 12.0)}
 
 
 @dataclass

@@ -24,7 +24,7 @@ def test_registers_are_read_off(tmp_path):
     (measured,) = read_off_registers(load_session(tmp_path))
     assert (measured.effect, measured.where) == ("dead_band", "two")
     assert measured.mean == pytest.approx(300 / 1023)
-    assert "register says so" in measured.seen
+    assert "own register, without" in measured.seen
 
 
 @pytest.mark.parametrize(("registers", "said"), [("nowhere.yaml", "registers: file not found"), (3, "registers: file not found")])

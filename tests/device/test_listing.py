@@ -47,7 +47,7 @@ def test_nobody_on_the_bus_is_an_error(tmp_path):
     r = robot("XL-330", joints=[], model=arm(tmp_path))
     for servo in r.servos.values():
         servo.power(False)
-    with pytest.raises(BusError, match="nobody answers, at 1000000 bit/s or any other"):
+    with pytest.raises(BusError, match="no servo answers, at 1000000 bit/s or any other"):
         list_servos(r.port)
 
 

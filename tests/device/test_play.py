@@ -118,7 +118,7 @@ def test_ctrl_c_ramps_to_neutral_and_releases(tmp_path):
 @pytest.mark.parametrize(("action", "said", "within"), [
     (lambda r: setattr(r.servos["two"], "temperature", 69.0), "servo 2 (two): 69 deg C, its limit is 70", 2.0),
     (lambda r: setattr(r.wire, "supply", 8.5), "8.5 V, below 9 V", 2.0),
-    (lambda r: setattr(r.wire, "supply", 6.2), "6.2 V, the supply is gone", 0.3),
+    (lambda r: setattr(r.wire, "supply", 6.2), "6.2 V, the supply has failed", 0.3),
     (lambda r: setattr(r.servos["two"], "overload", True), "servo 2 (two): alarm: overload", 0.3),
     (lambda r: setattr(r.servos["two"], "mute", True), "servo 2 (two): silent for 0.3 s", 0.4),
     (lambda r: (r.servos["two"].power(False), r.servos["two"].power(True)), "servo 2 (two): it restarted", 0.4),
@@ -179,7 +179,7 @@ def test_a_joint_that_something_holds_is_let_go(tmp_path):
     sense = r.body.sense
     r.body.sense = lambda joint, now: type(sense(joint, now))(0.6) if joint == 1 else sense(joint, now)
     result = played(tmp_path, r)
-    assert "servo 1 (one): stands at 34 deg and not at 0; what holds it?" in result.stopped
+    assert "servo 1 (one): is at 34 deg instead of 0; what holds it?" in result.stopped
     assert result.poses == 0
     assert limp(r)
 
@@ -187,7 +187,7 @@ def test_a_joint_that_something_holds_is_let_go(tmp_path):
 def test_a_pulled_plug_ends_in_one_line_and_the_log_is_kept(tmp_path):
     r = robot(angles=START, model=arm(tmp_path))
     r.at(3.0, lambda: setattr(r.port, "unplugged", True))
-    with pytest.raises(PortGoneError, match="the adapter is gone"):
+    with pytest.raises(PortGoneError, match="the adapter has disconnected"):
         played(tmp_path, r, 40)
     assert read_recording(tmp_path / "wave.csv").time[-1] > 0.5
     r.port.unplugged = False

@@ -75,7 +75,8 @@ def test_the_log_is_right_or_blank_at_any_latency(tmp_path, latency, jitter):
     assert min(result.rates.values()) > min(50.0, 0.6 / (3 * (latency + 0.0003)))
 
 
-@pytest.mark.parametrize(("family", "count", "least"), [("AX-12A", 15, 50), ("XL-430", 12, 200), ("STS3215", 6, 200)])
+@pytest.mark.parametrize(("family", "count", "least"), [("AX-12A", 15, 50), ("XL-430", 12, 200), ("STS3215", 6, 200),
+                                                    ("XL-330", 12, 200), ("MX-28", 12, 100)])
 def test_joints_are_read_as_often_as_the_bus_allows(tmp_path, family, count, least):
     """Through an adapter of 1 ms, at 1 Mbit/s."""
     model = chain(tmp_path, count)

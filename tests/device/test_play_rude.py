@@ -137,7 +137,7 @@ def test_a_dead_supply_on_the_way_back_releases(tmp_path):
     r.at(3.1, lambda: setattr(r.wire, "supply", 6.0))
     result, _ = perform_on(r, tmp_path, wave(0.5, degrees=60.0), 20, stop=lambda: stop.reason)
     assert result.stopped.startswith("Ctrl-C; then servo ")
-    assert "6.0 V, the supply is gone" in result.stopped
+    assert "6.0 V, the supply has failed" in result.stopped
     off = min(seconds(t) for s in r.servos.values() for t, a, v in s.written if a == 24 and not v)
     assert off < 3.3
 
@@ -186,7 +186,7 @@ def test_a_joint_that_did_not_come_back_is_no_success(tmp_path):
     r.body.sense = lambda joint, now: (type(sense(joint, now))(0.5) if joint == 1 and caught else sense(joint, now))
     r.at(3.5, lambda: caught.append(True))
     result, _ = perform_on(r, tmp_path, wave(0.1, degrees=30.0), 1)
-    assert "servo 1 (one): stands at 29 deg and not at 0; what holds it?" in result.stopped
+    assert "servo 1 (one): is at 29 deg instead of 0; what holds it?" in result.stopped
     assert limp(r)
 
 

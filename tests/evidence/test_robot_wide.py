@@ -14,7 +14,7 @@ from workbench.identify.evidence.hypothesis import Hypothesis, start
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts
-from workbench.identify.evidence.search import begun
+from workbench.identify.evidence.search import recalibrate_nominal
 
 JOINTS, OWN, ALL = 3, ("coulomb_friction", "backlash", "parallel_spring"), ("supply_sag", "thermal_fade")
 NOISE, FRAMES = 2e-3, 400
@@ -101,9 +101,9 @@ def test_two_effects_of_all_that_do_the_same_share_the_probability():
 
 def test_evidence_of_all_together_is_that_of_one_region_with_all_numbers():
     """The Schur complement of the joints, beside the determinant of the whole information matrix."""
-    rollouts, states = begun(robot({}, {"supply_sag": 2.0}), OPTIONS, lambda what, share=None: None)
+    rollouts, states = recalibrate_nominal(robot({}, {"supply_sag": 2.0}), OPTIONS, lambda what, share=None: None)
     whole = Whole(rollouts, tuple(candidate(n) for n in ALL), OPTIONS)
-    fit = whole.fitted(whole.predicted(whole.begun([f.best for f in states])))
+    fit = whole.fitted(whole.predicted(whole.start([f.best for f in states])))
     parts = [(f, G, r.likelihood.precision(f.r, f.discrepancy)) for f, G, r in zip(fit.fits, fit.slopes, whole.regions)]
     k = len(parts[0][0].hypothesis.theta)
     H = np.zeros((JOINTS * k + 1, JOINTS * k + 1))

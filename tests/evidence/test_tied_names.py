@@ -13,7 +13,9 @@ from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep
-from workbench.identify.evidence.tied_names import gravity_over_torque, names_of_tie, ratio_of
+from workbench.identify.evidence.tied_names import gravity_over_torque, names_of_tie, ratio_of, shared_by_tie
+from workbench.identify.results.findings import Alternative, Change, Estimate, Finding
+from workbench.identify.results.tied_names import GravityOverTorque, TiedName
 
 OPTIONS = EvidenceOptions()
 SHIFT = 0.04
@@ -73,3 +75,23 @@ def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
     assert said.confidence > 0.6
     assert best.log_posterior > fit.log_posterior
     assert "--model" not in said.said()
+
+
+def test_names_that_fits_do_not_separate_share_the_ties_probability():
+    def finding(effect):
+        change = Change(1.0, 0.5, "deg")
+        return Finding(effect, (JOINT,), 0.8, {}, change, change)
+
+    def named(effect, behind):
+        return TiedName(effect, (JOINT,), {}, "", behind)
+
+    ratio = Estimate(1.3, 1.2, 1.4, "1")
+    names = (named("parallel_spring", 0.0), named("payload", 3.0), named("com_shift", 9.0))
+    told = GravityOverTorque((JOINT,), ratio, 0.96, names, True)
+    shared = shared_by_tie(finding("parallel_spring"), told, OPTIONS)
+    assert shared.confidence == pytest.approx(0.48)
+    assert shared.tie == Alternative("payload", (JOINT,), 0.48)
+    assert shared.together == pytest.approx(0.96)
+    for alone in (finding("backlash"), finding("com_shift")):
+        assert shared_by_tie(alone, told, OPTIONS) == alone
+    assert shared_by_tie(finding("payload"), None, OPTIONS) == finding("payload")

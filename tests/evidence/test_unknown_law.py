@@ -14,8 +14,6 @@ from workbench.identify.evidence.search import lockstep
 from workbench.identify.evidence.torque_law import Functions, TorqueLaw
 from workbench.identify.evidence.unknown_law import with_unknown_law
 
-FULL = 1.0
-"""Torque at full duty [N m]; a weight of 0.03 of it moves a joint as a typical effect does."""
 AT = np.linspace(-90.0, 90.0, 19)
 PEAKS = np.exp(-0.5 * np.square((AT[:, None] - np.array([-60.0, -30.0, 0.0, 30.0, 60.0])) / 30.0))
 
@@ -55,7 +53,7 @@ def robot(true, weights=None, vocabulary=NAMES, overlap=0.0, noise=2e-3, seed=0)
 def weighed(rollouts):
     """Before and after an unnamed torque is allowed."""
     after, found, before = searched(rollouts)
-    done = lockstep(after, {0: with_unknown_law(found, OPTIONS, torque_law(), FULL)})
+    done = lockstep(after, {0: with_unknown_law(found, OPTIONS, torque_law())})
     return before, done[0], posterior_of(list(done[0].fits.values()), OPTIONS)
 
 

@@ -124,10 +124,11 @@ def test_the_readme_can_be_read_to_the_end() -> None:
 def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The example packages, built and installed by pip into a folder of their own."""
     source, target = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("site")
-    for name in ("effect", "format", "servo"):
+    packages = ("effect", "format", "servo", "capture")
+    for name in packages:
         shutil.copytree(DOCS / "examples" / name, source / name)
     subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--no-build-isolation",
-                    "--target", str(target), *(str(source / name) for name in ("effect", "format", "servo"))], check=True)
+                    "--target", str(target), *(str(source / name) for name in packages)], check=True)
     return target
 
 
@@ -162,6 +163,24 @@ from workbench.robot.servo_profile_file import servo_profile
 print(servo_profile("DEMO-1").constants().stall_torque)
 """
     assert float(ask(examples, code, tmp_path)) == 2.0
+
+
+def test_the_example_capture_format_is_read_and_says_what_is_damaged(examples: Path, tmp_path: Path) -> None:
+    rows = "".join(f"{k / 100} {k / 1000} 0 0.2 0 0 0 1\n" for k in range(30))
+    (tmp_path / "walk.txt").write_text("bodies trunk\n" + rows)
+    (tmp_path / "bad.txt").write_text("bodies trunk\n0 1 2\n")
+    code = """
+from workbench.recording import read_recording
+r = read_recording("walk.txt")
+print(r.kind, r.sensing, *r.rigid_bodies, *r.rigid_bodies["trunk"].quat[0], r.rigid_bodies["trunk"].p[5, 1], len(r.problems))
+try:
+    read_recording("bad.txt")
+except ValueError as e:
+    print(e)
+"""
+    first, second = ask(examples, code, tmp_path).splitlines()
+    assert first.split() == ["room_track", "mocap", "trunk", "1.0", "0.0", "0.0", "-0.0", "0.2", "0"]
+    assert "line 2: expected 8 numbers, got 3" in second
 
 
 def test_the_example_format_is_read_and_says_what_is_damaged(examples: Path, tmp_path: Path) -> None:

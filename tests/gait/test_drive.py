@@ -15,6 +15,9 @@ from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, corridor, plan
 from workbench.gait.drive.step_map import StepMap, increments
+from workbench.gait.drive.walk import Seen
+from workbench.robot import puppy_model
+from workbench.view.scene.drive import DriveScene
 
 MAP = StepMap(bias=0.0, gain=1.0, memory=0.4, ahead=0.12, aside=0.0, aside_gain=0.03, scatter=(0.01, 0.001), most=0.15)
 PERIOD = 0.4
@@ -146,3 +149,14 @@ def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40, di
         played, committed = committed, after
         poses.append(pose)
     return np.array(poses)
+
+
+def test_the_live_view_shows_path_discs_plan_and_robot() -> None:
+    """In Meshcat's own scene tree; the robot is where the cameras last saw it."""
+    scene = DriveScene(puppy_model(), WayPath([(1.0, 0.2)]), [Disc(0.5, 0.0, 0.05)])
+    for pose in ([0.1, 0.02, 0.3], [0.2, 0.03, 0.2], [np.nan] * 3):
+        scene.show(Seen(np.array(pose), np.array(pose)), np.array([[0.2, 0.03], [0.25, 0.04]]))
+    for name in ("path", "plan", "way", "discs/1", "way-points/1"):
+        assert scene.meshcat.HasPath(f"/drive/{name}")
+    assert scene.url.startswith("http")
+    assert scene.place[:2] == pytest.approx([0.2, 0.03])

@@ -12,8 +12,16 @@ import pytest
 
 from workbench.cli.main import main
 from workbench.files import InputError
-from workbench.gait.drive.certify import FILE, FamilyOptions, bounded_turns, certify_family, gait_sha256, read_family
-from workbench.gait.drive.family import load_family
+from workbench.gait.drive.certify import (
+    FILE,
+    FamilyOptions,
+    bounded_turns,
+    broken_limits,
+    certify_family,
+    gait_sha256,
+    read_family,
+)
+from workbench.gait.drive.family import GaitFamily, load_family
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import EffectSpec, puppy_model
 
@@ -59,6 +67,13 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
     replace(certificate, problems=("one fell",)).write(tmp_path)
     with pytest.raises(InputError, match="one fell"):
         read_family(gait, model)
+
+
+def test_a_family_whose_tables_break_a_joints_limit_says_at_which_turn(gait: Path) -> None:
+    family = load_family(gait, puppy_model())
+    deep = GaitFamily(family.machine, replace(family.shape, crouch=0.07))
+    assert broken_limits(family, FamilyOptions(grid=3)) == []
+    assert "turn -0.150" in broken_limits(deep, FamilyOptions(grid=3))[0]
 
 
 def test_the_robot_is_not_driven_without_it(gait: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,21 +24,19 @@ from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
 from workbench.gait.drive.controller import CycleController
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import GaitFamily, load_family
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.step_map import StepMap
 from workbench.gait.drive.walk import Cameras, Seen
-from workbench.gait.machine import GaitMachine
-from workbench.gait.shape import GaitShape
 from workbench.robot import EffectSpec, RobotModel, puppy_model
 
-SHAPE = GaitShape("trot", (1, 1), 8, 2.0, stride=0.03, duty=0.6, lift=0.02, crouch=0.05, lead=1.0)
-MAP = StepMap(bias=0.0, gain=1.2, memory=0.4, ahead=0.06, aside=0.0, aside_gain=0.0, scatter=(0.02, 0.003), most=0.15)
+GAIT = Path(__file__).parents[2] / "data/gaits/demo/gait.csv"
+MAP = StepMap(bias=0.0, gain=1.5, memory=0.15, ahead=0.05, aside=0.0, aside_gain=0.07, scatter=(0.013, 0.001), most=0.15)
 
 
 def family(model: RobotModel) -> GaitFamily:
-    return GaitFamily(GaitMachine(model), SHAPE)
+    return load_family(GAIT, model)
 
 
 @needs_compiler
@@ -84,7 +82,7 @@ def _driven(folder: Path, cameras: type[EmulatedCameras], stop: Any = lambda: ""
     board = Board(image(), robot.clock, robot.bus)
     board.power_on()
     board.run(robot.clock.now + SECOND // 2)
-    gaits, path = family(model), WayPath([(0.4, 0.0)])
+    gaits, path = family(model), WayPath([(0.35, 0.03)])
     controller = CycleController(path, MAP, gaits.period)
     done = drive_on_robot(PcLinkPort(board), model, gaits, path, controller, cameras(robot, Cameras(), 0), folder, stop,
                           virtual=robot)
@@ -170,7 +168,6 @@ def test_a_robot_that_cameras_do_not_see_is_refused() -> None:
 ])
 def test_options_that_do_not_fit_are_one_line(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str],
                                               tmp_path: Path) -> None:
-    gait = Path(__file__).parents[2] / "data/gaits/demo/gait.csv"
-    assert main(["drive", "1,0", "--gait", str(gait), "--out", str(tmp_path / "out"), *arguments]) == 2
+    assert main(["drive", "1,0", "--gait", str(GAIT), "--out", str(tmp_path / "out"), *arguments]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -88,7 +88,7 @@ def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(ma
     lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6, rms=1.3, torque=2.0)
     result = optimize(machine, Request(speed=3.0, limits=lax), Ensemble(), OptimizeOptions(SMALL, brief, planned=False), quiet)
     assert "cannot be met by any gait: foot speed" in result.problem
-    assert "the nearest table that a first look found goes" in result.problem
+    assert "the nearest table in a quick search reaches" in result.problem
     assert result.table is not None
     said = refused(capsys, "optimize", "--slope", "30", "--out", str(tmp_path / "out"))
     assert "slope, friction 0.5" in said
@@ -140,7 +140,7 @@ def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
     result = optimize(machine, replace(request, limits=lax), Ensemble(), options, quiet)
     assert not result.met
     assert "not met" in result.problem
-    assert "the nearest table that keeps every limit goes" in result.problem
+    assert "the nearest table that keeps every limit reaches" in result.problem
     assert result.table is not None
     assert not result.certified.certificate.kept
 

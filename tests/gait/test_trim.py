@@ -13,7 +13,7 @@ from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.shape import GaitShape
-from workbench.gait.straighten import METRES, Straightener, heading_gain, told, turned_by
+from workbench.gait.straighten import METRES, Straightener, heading_gain, summary_of_straightened, turned_by
 from workbench.gait.table import gait_table
 from workbench.gait.trim import turn_in
 from workbench.gait.turning import MOST_TRIM, TurnEstimate, recorded_turn
@@ -79,7 +79,7 @@ def test_a_crooked_robot_is_straightened_by_what_it_records(machine):
     assert len(degrees) == METRES + 1
     assert abs(degrees[0]) > 10
     assert abs(degrees[METRES]) < 3
-    assert told(walks, gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
+    assert summary_of_straightened(walks, gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
 
 
 def test_turn_is_taken_back_as_far_as_legs_reach(machine):

@@ -10,7 +10,9 @@ from workbench.identify.loads import steady_loads, unloaded_joints
 from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import prepared
 from workbench.identify.proposals import candidates
+from workbench.identify.unobservable import HELD, NO_CAMERA, unobservable
 from workbench.simulation import SimulationConfig
+from workbench.view.report.words import hidden_effects
 
 LOADED = {"backlash", "joint_compliance", "load_friction"}
 
@@ -29,6 +31,19 @@ def test_an_arm_that_hangs_is_loaded_by_its_weight(logged):
     assert steady_loads(model, e) == pytest.approx([most], rel=0.05)  # of a sample of the poses
     assert unloaded_joints(model, [e]) == set()
     assert {c.name for c in candidates(model, [e])} >= LOADED
+
+
+def test_what_a_held_log_cannot_show_is_listed_with_the_reason(logged):
+    _, model, (e,) = logged
+    hidden = unobservable(model, [e])
+    assert hidden["ground_friction"] == HELD
+    assert hidden["marker_frame"] == NO_CAMERA
+    assert hidden[f"payload at {model.base}"] == HELD
+    assert not {"coulomb_friction", "payload", "backlash"} & set(hidden)
+    assert not set(hidden) & {c.name for c in candidates(model, [e])}
+    said = " ".join(hidden_effects(hidden))
+    assert f"because {HELD}: " in said
+    assert "ground friction" in said
 
 
 def test_on_an_axis_that_stands_upright_nothing_is_loaded(logged):

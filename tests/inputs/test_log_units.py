@@ -1,4 +1,4 @@
-"""Units, signs and zeros of servo logs: told where they contradict what a servo can do, or another channel of the same joint."""
+"""Units, signs and zeros of servo logs that contradict the limits of a servo, or another channel of the same joint."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class Run:
     struck: int = field(init=False, default=0)
 
     def play(self) -> list[str]:
-        """Records, and returns what was violated, a line each."""
+        """Records, and returns the violations, a line each."""
         with tempfile.TemporaryDirectory() as folder:
             return self._play(Path(folder) / "take.csv")
 
@@ -171,7 +171,7 @@ def runs(seed: int) -> Iterator[Run]:
 
 
 def campaign(faults: int, seed: int = 0) -> tuple[int, list[tuple[Run, str]]]:
-    """Runs until so many faults have struck; how many did, and what was violated by which run."""
+    """Runs until so many faults have struck; their number, and the violations of each run."""
     struck, out = 0, []
     for run in runs(seed):
         out += [(run, line) for line in run.play()]

@@ -22,7 +22,7 @@ WIRE = range(1, 9)
 SESSIONS = ("walk and stop", "upload and release", "by remote", "by button", "bridged", "to the end")
 RULES = (
     "", "torque returned after a release", "torque 50 ms after a release", "motion 50 ms after a stop", "a goal out of bounds",
-    "a goal without or beyond its speed", "the first torque is full or fast", "what is wrong with a servo was not found in 0.4 s",
+    "a goal without or beyond its speed", "the first torque is full or fast", "a servo's fault was not found in 0.4 s",
 )
 
 
@@ -60,7 +60,7 @@ class Injection:
 
 
 def complaint(run: Run) -> str:
-    """What is wrong with how a session went, "" where nothing is."""
+    """The violation in a session, "" where nothing is."""
     if run.rule:
         return f"{RULES[run.rule]}: joint {run.rule_joint} at {run.rule_at} ms"
     if not run.answered and FAULTS[run.fault] not in ("link cut",):
@@ -115,7 +115,7 @@ class Monitor:
                 setattr(joint, name, value)
 
     def look(self, ms: int, go: bool = False, stop: bool = False, release: bool = False, reset: bool = False) -> None:
-        """A millisecond has gone by; what was asked in it."""
+        """A millisecond has gone by, with these requests."""
         core().monitor_look(ctypes.byref(self.state), ms, go + 2 * stop + 4 * release + 8 * reset)
 
     @property

@@ -45,7 +45,7 @@ class CorePort:
         return len(data)
 
     def readPort(self, length: int) -> bytes:
-        """What is there; where nothing is, a millisecond goes by."""
+        """Bytes that have come; without any, a millisecond goes by."""
         if not self._rx:
             self.run(1)
         got, self._rx = (b"", b"") if self.unplugged else (self._rx[:length], self._rx[length:])

@@ -42,7 +42,7 @@ FAMILIES = ("AX-12A", "XL-330", "STS3215")
 
 @dataclass
 class Run:
-    """One playing with one kind of fault. k: of the events. seed: of what is random in a fault."""
+    """One playing with one kind of fault. k: of the events. seed: of a fault's random part."""
 
     family: str
     fault: str
@@ -76,7 +76,7 @@ class Run:
         return self.robot.wire.clock.now / 72e6 * CLOCKS.get(self.fault, 1.0)
 
     def _set_clock(self) -> None:
-        """The host's clock runs at its own rate: what it calls a second is another time on the wire."""
+        """The host's clock runs at its own rate."""
         port, ratio = self.robot.port, CLOCKS.get(self.fault, 1.0)
         pause = port.pause
         port.getCurrentTime = lambda: 1000 * self.now
@@ -108,7 +108,7 @@ class Run:
     # The run
 
     def play(self) -> list[str]:
-        """Plays, and returns what was violated, a line each."""
+        """Plays, and returns the violations, a line each."""
         with tempfile.TemporaryDirectory() as folder:
             return self._play(Path(folder))
 
@@ -189,7 +189,7 @@ class Run:
 
 
 def campaign(faults: int, seed: int = 0) -> tuple[int, list[tuple[Run, str]]]:
-    """Runs until so many faults have struck. Returns how many did, and what was violated by which run."""
+    """Runs until so many faults have struck. Returns their number, and the violations of each run."""
     rng, struck, out = random.Random(seed), 0, []
     n = 0
     while struck < faults:

@@ -1,4 +1,4 @@
-"""What goes wrong in the host's campaign: at its own packets, at the servos' answers, or in the whole run."""
+"""Faults of the host's campaign: at its own packets, at the servos' answers, or in the whole run."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _twin(run: Run) -> None:
 
 
 def _deaf(run: Run) -> None:
-    """What the host sends still goes out."""
+    """The host's own packets still go out."""
     run.robot.port.hear = lambda times, values, garbled, rate: None
 
 

@@ -1,6 +1,6 @@
 """The loader's side of the campaign: a program is loaded while something goes wrong at the k-th byte of the conversation.
 
-Judged is what `flash` says of the controller against what the emulated controller holds.
+The campaign compares what `flash` reports with the program in the emulated controller.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PROFILE = load_loader_profile()
 IMAGE = struct.pack("<II", 0x20010000, 0x08003101) + random.Random(0).randbytes(600)
 TRUTH = {UNTOUCHED: {"factory"}, ASKED: {"factory", "nothing"}, HALF: {"nothing"}, UNKNOWN: {"new", "nothing"},
          LOADED: {"new"}}
-"""What the controller may hold after each thing that is said of it."""
+"""Programs that the controller may hold after each report."""
 FAULTS = ("cut", "sent byte lost", "sent byte flipped", "heard byte lost", "heard byte flipped", "deaf", "mute", "switched off",
           "late", "burst lost", "noise")
 AGAIN = ("sent byte lost", "sent byte flipped", "heard byte lost", "heard byte flipped", "noise")
@@ -68,7 +68,7 @@ class RudeLoader(EmulatedLoader):
         self.time += len(data) * 10 / PROFILE.rate
 
     def read(self, seconds: float) -> bytes:
-        """What comes within this time."""
+        """Bytes that come within this time."""
         self.time += seconds
         self._settle()
         out = b"".join(text for due, text in self._out if due <= self.time)
@@ -99,7 +99,7 @@ class Run:
     """Whether a damaged image passed the loader's own check, a sum of one byte: by chance one in 256 does."""
 
     def play(self) -> list[str]:
-        """Loads, and returns what was said wrongly, a line each."""
+        """Loads, and returns the wrong reports, a line each."""
         controller = Controller()
         line = RudeLoader(controller, self.fault, self.k, self.every, self.seed)
         out: list[str] = []
@@ -137,7 +137,7 @@ def runs(seed: int) -> Iterator[Run]:
 
 
 def campaign(faults: int, seed: int = 0) -> tuple[int, list[tuple[Run, str]]]:
-    """Runs until so many faults have struck; how many did, and what was violated by which run. A run counts as at most ten."""
+    """Runs until so many faults have struck; their number, and the violations of each run. A run counts as at most ten."""
     struck, out = 0, []
     for run in runs(seed):
         out += [(run, line) for line in run.play()]

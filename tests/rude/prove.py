@@ -98,7 +98,7 @@ def one(name: str, faults: int, seed: int) -> dict:
 
 
 def version() -> str:
-    """Of all code that is judged or judges."""
+    """Hash of the code under test and of the campaigns."""
     digest = hashlib.sha256()
     for folder in JUDGED:
         for path in sorted((ROOT / folder).rglob("*")):

@@ -34,7 +34,7 @@ def whole_sessions() -> dict[int, int]:
 
 
 def campaign(count: int, skip: int = 0, step: int = 1) -> list[str]:
-    """Every `step`-th of so many injections, from `skip` on; what the monitor says of each that it complains of."""
+    """Every `step`-th of so many injections, from `skip` on; the monitor's complaints."""
     lengths = whole_sessions()
     chosen = list(injections(count, lengths))[skip::step]
     return [f"{i}: {c}" for i in chosen if (c := complaint(i.run(TABLES)))]
@@ -50,11 +50,11 @@ PLANTED = {
     "START held does nothing where it stands still": ("reactions.c", "still || reason == REASON_HELD))", "still))"),
     "no judgement after a reset": ("reactions.c", "if (!torque_on(r) && r->state != STATE_STILL) return;",
                                    "if (!torque_on(r)) return;"),
-    "torque off is told once": ("commands.c", "if (!known) r->send_release = true;", "(void)known;"),
+    "torque off is sent once": ("commands.c", "if (!known) r->send_release = true;", "(void)known;"),
     "speed 0 goes out": ("motion.c", "    if (speed) return (uint16_t)speed;", "    return (uint16_t)speed;"),
     "the first ramp at full force": ("robot.c", "        r->gentle = true;", "        r->gentle = false;"),
     "a silent servo is not found": ("reactions.c", "        if (silent) react", "        if (silent && s->missed > 200u) react"),
-    "a check goes on after a release": ("commands.c", "        enter(r, STATE_LIMP, REASON_LINK, 0xFF);",
+    "a check continues after a release": ("commands.c", "        enter(r, STATE_LIMP, REASON_LINK, 0xFF);",
                                         "        if (torque_on(r)) enter(r, STATE_LIMP, REASON_LINK, 0xFF);"),
 }
 
@@ -121,7 +121,7 @@ def test_the_monitor_sees_what_breaks_each_rule(rule: int) -> None:
 
 @dataclass
 class Trouble:
-    """What goes wrong in a session of the host at `at` ms: see `make`."""
+    """A fault in a session of the host at `at` ms: see `make`."""
 
     kind: str
     at: int
@@ -156,7 +156,7 @@ def make(trouble: Trouble, sim: Sim, port: CorePort) -> None:
 
 
 def host_session(trouble: Trouble, folder: Path) -> str:
-    """The host's verb against the core with trouble; "" or what is wrong with how that ended."""
+    """The host's verb against the core with trouble; "" or the complaint about its end."""
     sim = Sim(walk(), seed=trouble.at)
     done: list[int] = []
     plays: list[int] = []
@@ -196,7 +196,7 @@ def host_session(trouble: Trouble, folder: Path) -> str:
 
 
 def host_sessions(count: int, seed: int, folder: Path) -> tuple[int, list[str]]:
-    """Sessions of the host with trouble of each kind in turn; how many, and what is wrong with how they ended."""
+    """Sessions of the host with trouble of each kind in turn; their number, and complaints about their ends."""
     rng = random.Random(seed)
     troubles = [Trouble(KINDS[n % len(KINDS)], rng.randrange(150, 5200), rng.randrange(15)) for n in range(count)]
     return count, [f"{t}: {c}" for t in troubles if (c := host_session(t, folder))]

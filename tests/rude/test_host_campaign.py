@@ -14,9 +14,11 @@ FOUND = [
     ("AX-12A", "short stall", 3, 93),
     ("STS3215", "long stall", 544, 255),
     ("STS3215", "second program", 450, 3),
+    ("XL-330", "garbled command", 5, 198),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
-lost on the wire, or were sent in a bunch after a stall, and exit code 0; answers to another program's questions in the log."""
+lost on the wire, or were sent in a bunch after a stall, and exit code 0; answers to another
+program's questions in the log; torque that stayed on where a start failed."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

@@ -1,4 +1,4 @@
-"""`flash` against a rude loader, `record` against rude cameras, and the run of all campaigns that `make prove` does."""
+"""`flash` against a rude loader, `record` against rude cameras, and the runner of `make prove`."""
 
 import json
 import sys

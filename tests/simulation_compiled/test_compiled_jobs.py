@@ -15,7 +15,7 @@ from workbench.motion.files import load_motion
 from workbench.robot import EffectSpec, Ground, RobotModel, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, Start, simulate_batch
 from workbench.simulation.batch import run_job
-from workbench.simulation.compiled import covers
+from workbench.simulation.compiled import covers, station
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.rollout import BaseState
 from workbench.simulation.steady import BaseStates
@@ -169,3 +169,12 @@ def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robo
     alone = run_job(job)
     for take in simulate_batch([replace(job, name=str(k)) for k in range(4)], 2):
         np.testing.assert_array_equal(take.q, alone.q)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_station_is_compiled_ahead_unless_it_was_before(known, monkeypatch):
+    played = []
+    monkeypatch.setattr(station, "is_compiled", lambda: known)
+    monkeypatch.setattr(station, "run_compiled", played.append)
+    assert station.compile_station() is not known
+    assert len(played) == (not known)

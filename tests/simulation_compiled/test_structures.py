@@ -55,7 +55,7 @@ def test_numbers_are_written_as_drake_reads_them(robot: RobotModel, effect: str,
 
 def test_another_axis_is_another_structure() -> None:
     robot = RobotModel(str(ARM), base="base")
-    said = [{"play": 1.0, "axis": axis} for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8))]
+    said: list[Parameters] = [{"play": 1.0, "axis": axis} for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8))]
     found = []
     for parameters in said:
         model = robot.with_effect(EffectSpec("loose_mount", (robot.joints[0],), parameters))

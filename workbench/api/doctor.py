@@ -60,6 +60,15 @@ class Health:
         return "\n".join(lines)
 
 
+def compile_rollouts() -> None:
+    """Compiles the station, where numba is installed and this has not been done; a warning says that it takes a minute."""
+    try:
+        from workbench.simulation.compiled import compile_station
+    except ImportError:
+        return  # `examine` reports it
+    compile_station()
+
+
 def examine(defaults: Path) -> Health:
     """Looks at versions, cores, memory, disk, the compiler's cache, Meshcat, the second engine, shell completion. defaults: where
     the user's own would be."""
@@ -128,7 +137,8 @@ def _compiled() -> Check:
         at = at.parent
     if not os.access(at, os.W_OK):
         return Check("compiled rollouts", "missing", f"{at} cannot be written", "set NUMBA_CACHE_DIR, or each run compiles again")
-    return Check("compiled rollouts", "ok", f"not compiled yet; made at first use in {folder}")
+    return Check("compiled rollouts", "ok", f"not compiled yet; the first rollout takes a minute longer (in {folder})",
+                 "workbench doctor --compile")
 
 
 def _meshcat() -> Check:

@@ -72,7 +72,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     session = write_session(folder, model, takes, "registers.yaml")
     warnings = [f"register {d}" for d in registers.departures(model)] + list(capture.problems if capture else ())
     if played.missed:
-        warnings.insert(0, f"{played.missed} goals did not reach their servos in time; this was not the motion asked for")
+        warnings.insert(0, f"{played.missed} goals did not reach their servos in time; this was not the requested motion")
     if played.unknown:
         warnings.insert(0, f"torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off")
     if played.stopped:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
+from typing import Any
 
 from workbench.compare.session import load_session
 from workbench.effects.apply import resolved
@@ -12,7 +13,9 @@ from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
 from workbench.robot import ROBOTS, RobotModel, puppy_model, resource_dir
 from workbench.robot.model import PUPPY
+from workbench.robot.model_file import Posterior
 from workbench.robot.model_file import load_model as read_model_file
+from workbench.robot.model_file import save_model as write_model_file
 
 
 def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None = None) -> RobotModel:
@@ -41,3 +44,14 @@ def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None =
     except InputError as e:
         raise InputError(name, f"effects: {e.problem}") from None
     return model
+
+
+def save_model(model: RobotModel, path: str | PathLike[str], posterior: Posterior | None = None,
+               provenance: Mapping[str, Any] | None = None) -> Path:
+    """Writes model.yaml, whole or not at all; returns its path.
+
+    posterior: of the effects' parameters, provenance: how they were found; both are kept for a reader and change nothing.
+    InputError where an effect is unknown, acts at no such part or has impossible numbers, or where the file cannot be written.
+    """
+    list(resolved(model))
+    return write_model_file(model, Path(path), posterior, provenance)

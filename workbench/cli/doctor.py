@@ -15,14 +15,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "completion, and suggests how to install anything missing. Exits with 2 where something keeps the workbench from "
         "working.")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--compile", action="store_true",
+                        help="compile the rollouts now (about a minute, once for each version), so that no later command waits")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Looks and prints."""
-    from workbench.api.doctor import examine
+    from workbench.api.doctor import compile_rollouts, examine
     from workbench.cli.defaults import defaults_file
 
+    if args.compile:
+        compile_rollouts()
     health = examine(defaults_file())
     print(json.dumps(health.as_dict(), indent=2) if args.json else health.as_text())
     return 0 if health.works else 2

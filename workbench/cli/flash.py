@@ -61,8 +61,8 @@ def run(args: argparse.Namespace) -> int:
     ends = f"ends after {program.table.cycles} cycles" if program.table.stops else "repeats until a person stops it"
     print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints; it {ends}")
     if not profile.confirmed:
-        print(f"workbench flash: warning: the workbench has seen no text in {profile.source} on a real controller yet, and "
-              "nobody has published those after LOAD; it stops at the first that differs (see the transcript)", file=sys.stderr)
+        print(f"workbench flash: warning: the texts in {profile.source} are not confirmed on a real controller, "
+              "and those after LOAD are unpublished; it stops at the first that differs (see the transcript)", file=sys.stderr)
     print(FACTORY)
     print(MOVES)
     if args.dry_run:

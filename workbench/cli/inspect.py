@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 
 from workbench.cli.options import add_packages
 
@@ -25,9 +26,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the inspection."""
+    """Prints the inspection; returns 2 for a session that other verbs would refuse."""
     from workbench.inspect.recognise import inspect_file
 
     inspection = inspect_file(args.file, dict(args.packages))
     print(json.dumps(inspection.as_dict(), indent=2, allow_nan=False) if args.json else inspection.as_text())
+    if inspection.unusable:
+        print(f"workbench inspect: error: {args.file}: {inspection.unusable}", file=sys.stderr)
+        return 2
     return 0

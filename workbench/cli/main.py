@@ -26,8 +26,8 @@ from workbench.cli.log import LOGGER, RunLog, speak_up
 from workbench.cli.progress import forget_warnings, progress_mode, show_warnings
 
 VERBS = (
-    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "trim", "drive",
-    "export", "flash", "servos", "play", "record", "run", "bench", "doctor",
+    "demo", "new-robot", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "trim",
+    "drive", "export", "flash", "servos", "play", "record", "run", "bench", "doctor",
 )
 
 

@@ -104,7 +104,7 @@ def _write_bag(log: Path, played: Played, offset: float) -> None:
     from workbench.recording.formats.rosbag_write import write_rosbag
 
     if played.log_problem or math.isnan(played.log_start):
-        print("workbench play: warning: no bag, as there is no whole joint log", file=sys.stderr)
+        print("workbench play: warning: no bag, because the joint log is incomplete", file=sys.stderr)
         return
     print(f"wrote {write_rosbag(read_recording(log), log.with_name(log.stem + '_bag'), played.log_start + offset)}")
 

@@ -13,7 +13,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "view",
         help="open a robot, a take or a session in live Meshcat",
-        description="Serves Drake's Meshcat and says where to open it in a browser, until Ctrl-C. A robot (model.yaml, SDF, "
+        description="Serves Drake's Meshcat and prints the address to open in a browser, until Ctrl-C. A robot (model.yaml, SDF, "
         "URDF, or a name such as puppy) gets a slider for each joint; a motion is simulated and plays; a recording or a "
         "rollout plays; of a session one take plays with the recorded robot as a ghost over the simulated one. "
         "A file that opens without a server is what `simulate` writes: replay.html.")

@@ -51,7 +51,7 @@ REASONS = (
     "PC link",
     "the table came to its end", "a servo is silent", "a servo's answers are garbled (two with one ID, or a bad line)",
     "a servo of another model", "a servo is overloaded", "a servo is hot", "the battery is low", "the servos' supply is dead",
-    "somebody babbles on the bus", "a joint did not arrive", "a servo does not take its goal",
+    "a device babbles on the bus", "a joint did not arrive", "a servo does not take its goal",
     "a servo's angle limits are narrower than the table", "START was held", "the PC fell silent in bridge mode",
     "the built-in table is broken", "a joint was moving before torque went on",
     "nobody used it for five minutes",

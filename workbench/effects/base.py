@@ -110,7 +110,7 @@ class Effect:
     under_load: ClassVar[bool] = False
     """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
     rarity: ClassVar[float] = 0.0
-    """By how much less likely than others it is before any data [nats]."""
+    """Penalty in its prior log probability, compared with other effects [nats]."""
     needs_steady_load: ClassVar[bool] = False
     """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True
@@ -286,4 +286,4 @@ def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     allowed = {name for place in effect.places for name in known[place]}
     for name in spec.where:
         if name not in allowed:
-            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is no {' or '.join(effect.places)} of this robot")
+            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is not a {' or '.join(effect.places)} of this robot")

@@ -153,7 +153,7 @@ def check_certificate(path: str | Path, motion: Motion, model: RobotModel) -> Ce
         raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
     if not certificate.kept:
         broken = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
-        raise InputError(at, f"it says that a limit is broken: {broken}")
+        raise InputError(at, f"it reports a broken limit: {broken}")
     return certificate
 
 

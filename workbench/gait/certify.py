@@ -28,8 +28,7 @@ from workbench.gait.requirements import direction_margins, drift, floor_margins,
 from workbench.gait.second_engine import conditions
 from workbench.gait.second_engine import margins as engine_margins
 from workbench.gait.second_engine import summary as engines_summary
-from workbench.gait.straighten import Straightener, heading_gain, trim_margin
-from workbench.gait.straighten import told as straightened
+from workbench.gait.straighten import Straightener, heading_gain, summary_of_straightened, trim_margin
 from workbench.gait.table import GaitTable
 from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
@@ -84,7 +83,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     walks = [w for group in results for w in group]
     told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if straightener is not None:
-        told["straightened"] = straightened(walks, straightener.gain)
+        told["straightened"] = summary_of_straightened(walks, straightener.gain)
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),

@@ -224,7 +224,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
-        said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
+        said += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
     return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
 
 
@@ -264,7 +264,7 @@ def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | Non
     if limit is not None:
         said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if nearest is not None:
-        said += f"; the nearest table that keeps every limit goes {_speed(request, nearest)}"
+        said += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
     return said
 
 

@@ -36,10 +36,10 @@ ENOUGH = 1.7
 class RefineOptions:
     """Size of the refinement. InputError for a number out of range.
 
-    iterations: Gauss-Newton steps; 0: none. robots: of the ensemble, beside the nominal one. harmonics: of the cycle in each
-    joint's change, beside its mean. probe: change of a harmonic by which its effect is measured [rad]. target: speed that is
-    aimed at, by the nominal robot's. speed, heading [by rad/m], slip, clearance, torque: weights of the residuals: speed is
-    relative to the nominal robot's; slip and torque count from `near` of their limits on, clearance below ENOUGH of its own.
+    iterations: Gauss-Newton steps; 0: none. robots: of the ensemble, in addition to the nominal one. harmonics: of the cycle in
+    each joint's change, in addition to its mean. probe: change of a harmonic by which its effect is measured [rad]. target: speed
+    that is aimed at, by the nominal robot's. speed, heading [by rad/m], slip, clearance, torque: weights of the residuals: speed
+    is relative to the nominal robot's; slip and torque count from `near` of their limits on, clearance below ENOUGH of its own.
     """
 
     iterations: int = 1
@@ -157,7 +157,8 @@ class _Basis:
 
 
 def _pairs(machine: GaitMachine, q: Array, shift: int) -> tuple[tuple[int, int, int], ...]:
-    """Each joint of a left leg with its image on the right: columns, and 1 or -1 as they turn alike or opposite in a straight
+    """Each joint of a left leg with its mirror image: columns, and 1 or -1 as they turn in equal or opposite directions in a
+    straight
     gait's angles q (P, n)."""
     out, joints = [], machine.model.joints
     for left in (leg for leg in machine.legs if leg.neutral[1] > 0):

@@ -106,7 +106,7 @@ def trim_margin(request: Request, walks: Sequence[tuple[float, ...]]) -> Margin:
     return Margin(name, f"{len(left)} robots", rms(left), allowed, "deg/m RMS", rms(left) / allowed)
 
 
-def told(walks: Sequence[tuple[float, ...]], gain: float) -> dict[str, Any]:
+def summary_of_straightened(walks: Sequence[tuple[float, ...]], gain: float) -> dict[str, Any]:
     """The certificate's entry for straightened robots. walks: as `Straightener.robots` gives them [rad/m]."""
     every = {n: [math.degrees(w[n]) for w in walks if len(w) > n] for n in (0, 1, METRES)}
     return {"robots": len(walks), "fell while they were straightened": sum(len(w) <= METRES for w in walks),

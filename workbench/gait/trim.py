@@ -87,7 +87,7 @@ def turn_in(recording: str | Path, model: RobotModel, period: float) -> Recorded
     not show the base, or is too short."""
     read = read_recording(recording)
     if read.sensing != "mocap":
-        raise InputError(recording, f"expected a recording by cameras, got {read.kind}: servos do not see where a robot goes")
+        raise InputError(recording, f"expected a recording by cameras, got {read.kind}: servos cannot measure the robot's path")
     check_assets(read, model)
     tracks = mend(tracks_of(read), model)
     base = base_row(tracks, model)

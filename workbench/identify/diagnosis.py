@@ -38,6 +38,7 @@ from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
+from workbench.identify.unobservable import unobservable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
@@ -168,7 +169,8 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
+        | subset_used(found.looked_at) | how_logged([e.take for e in evidence])
+        | {"cannot_show": unobservable(session.model, evidence)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)
     changed = bool(findings or unknown or found.recalibrated)

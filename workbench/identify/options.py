@@ -56,6 +56,8 @@ class ProblemOptions:
     """Which of these."""
     least_body_sigma: tuple[float, ...] = (1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004)
     """Of the body's channels [m, m, rad, m, rad, rad]: below this no contact model is believed."""
+    still: float = 0.02
+    """A joint whose recorded angle covers less than this tells nothing of its servo or gear [rad]."""
     late: float = 0.1
     """Shift of an estimated start that every model is allowed [s]: a robot whose servos received each other's speeds sets out so
     unlike the nominal one that its start was estimated 62 ms early."""

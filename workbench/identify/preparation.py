@@ -18,6 +18,7 @@ from workbench.files import InputError
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, part_of, running_sum
 from workbench.identify.shooting import base_states, unsettled
+from workbench.recording.servo_log.goal_stamps import STAMPS
 from workbench.recording.take import Take
 from workbench.simulation import SimulationConfig
 from workbench.simulation.steady import BaseStates
@@ -93,7 +94,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     across = [i for i, c in enumerate(names) if ACROSS in c]
     if across:  # one camera system sees all bodies alike
         noise[across] = np.nanmedian(noise[across])
-    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
+    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2 + _stamp_error(t, recorded, moving) ** 2)
     weight = np.ones(len(names))
     if BODY[0] in names:  # neighbouring frames of the body tell nearly the same
         body = [names.index(c) for c in BODY]
@@ -107,6 +108,16 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     return TakeEvidence(
         t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
         t.recorded.zeroed and t.spec.starts_at is None, contact, np.nan_to_num(noise) ** 2 / sigma**2, rough, steadied)
+
+
+def _stamp_error(t: RegisteredTake, recorded: Array, moving: Mask) -> Array:
+    """Standard deviation (c,) of each channel from goals that were sent at an unknown time within an interval: its RMS speed
+    times the interval over sqrt(12)."""
+    within = float(t.recording.metadata.get(STAMPS, 0.0))
+    if not within:
+        return np.zeros(recorded.shape[1])
+    speed = np.gradient(recorded, t.recorded.time, axis=0)[moving]
+    return np.asarray(np.nan_to_num(rms(speed)) * within / np.sqrt(12.0))
 
 
 def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:

@@ -71,11 +71,6 @@ class SessionCheck:
         return out
 
 
-def session_problems(session: Session) -> list[str]:
-    """All problems of a session, one line each."""
-    return [f"{part}: {text}" for part, lines in session_check(session).problems.items() for text in lines]
-
-
 def session_check(session: Session) -> SessionCheck:
     """Checks a session: its robot, its servos, its takes and its predictions. Every file is read and checked against the robot;
     a damaged one is a problem of its take."""

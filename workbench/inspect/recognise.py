@@ -15,6 +15,7 @@ from workbench.files.errors import UnknownFolderError
 from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
+from workbench.recording.servo_log.goal_stamps import STAMPS
 from workbench.robot import ROBOTS, RobotModel, load_servo_constants
 from workbench.robot.servo_units import unknown_family
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
-_SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units")
+_SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units", STAMPS)
 """Of a Motive header: what other fields of the inspection say."""
 _RESULTS = {"findings": ("verdict", "findings"), "comparison": ("takes", "joints_by_error"), "certificate": ("claim", "margins"),
             "bench": ("figures",)}
@@ -37,6 +38,7 @@ class Inspection:
 
     rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets,
     markers or channels that have any; share_of_gaps: over all of them. details: further facts about its kind.
+    unusable: why other verbs would refuse a session; empty where they would not.
     """
 
     file: str
@@ -53,6 +55,7 @@ class Inspection:
     gaps: Mapping[str, float] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
+    unusable: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain types, for JSON."""
@@ -271,15 +274,20 @@ def _yaml(path: Path) -> Inspection:
 
 def _session(path: Path) -> Inspection:
     from workbench.compare.session import load_session
-    from workbench.inspect.problems import session_problems
+    from workbench.inspect.problems import session_check
 
     session = load_session(path)
+    check = session_check(session)
+    problems = [f"{of}: {text}" for of, lines in check.problems.items() for text in lines]
+    takes = {f"take '{t.name}'" for t in session.takes}
+    none_left = bool(takes) and takes <= set(map(str, check.damaged)) and not session.predict
+    lost = check.refused or ("none of its takes can be used" if none_left else "")
     logged = _logged(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,
         details={"model": session.model.description, "base": session.model.base,
                  "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict], **logged},
-        problems=tuple(session_problems(session)))
+        problems=tuple(problems), unusable=lost)
 
 
 def _logged(session: Session) -> dict[str, str]:

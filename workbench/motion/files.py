@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
+from workbench.files.nearest import did_you_mean
 from workbench.files.numerals import number_of, whole_of
 from workbench.files.reading import write_whole
 from workbench.files.tables import plain_text
@@ -48,7 +49,8 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
         motion = load_trajectory(file, page)
         strange = [joint for joint in motion.joints if model is not None and joint not in model.joints]
         if strange and model is not None:
-            raise InputError(path, f"the robot has no joint '{strange[0]}'; its joints: {' '.join(model.joints)}")
+            raise InputError(path, f"the robot has no joint '{strange[0]}'; its joints: {' '.join(model.joints)}"
+                             + did_you_mean(strange[0], model.joints))
     else:
         motion = _parse(path, plain_text(path), model)
     return motion if model is None else replace(motion, units=units_of(model, motion.joints))
@@ -94,7 +96,7 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
     ramped = [name for name in names if name.startswith(SPEED)]
     for name in (*(SPEED + j for j in joints if ramped), *ramped):
         if name not in names or name.removeprefix(SPEED) not in joints:
-            raise InputError(path, f"line {lines[0][0]}: column '{name}': expected {SPEED}JOINT of all joints or of none")
+            raise InputError(path, f"line {lines[0][0]}: column '{name}': expected {SPEED}JOINT for every joint or for none")
 
     def columns(wanted: Sequence[str]) -> NDArray[np.float64]:
         return np.radians(table[:, [names.index(name) for name in wanted]])
@@ -129,7 +131,7 @@ def _sections(path: str | Path, names: list[str], rows: list[Line]) -> tuple[int
         last = SECTIONS.index(found)
         of_rows.append(found)
     if of_rows and of_rows[0] != of_rows[min(1, len(of_rows) - 1)]:
-        problem = f"'{of_rows[0]}' has no pose: the first row is none, it is where the second one comes from"
+        problem = f"'{of_rows[0]}' has no pose: the first row only gives the start of the second"
         raise InputError(path, f"line {rows[0][0]}, column {SECTION}: {problem}")
     if "loop" not in of_rows:
         raise InputError(path, f"column {SECTION}: expected rows of a loop")
@@ -153,9 +155,10 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
         raise InputError(path, f"line {n}: expected a header with a column 'time', found {', '.join(first[:4])}")
     for name in first:
         if first.count(name) > 1:
-            raise InputError(path, f"line {n}: column '{name}' stands there twice")
+            raise InputError(path, f"line {n}: column '{name}' is given twice")
         if name not in ("time", SECTION) and known is not None and name.removeprefix(SPEED) not in known:
-            raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}")
+            raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}"
+                             + did_you_mean(name, known))
     return first, lines[1:]
 
 

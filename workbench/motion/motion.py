@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from html import escape
 
 import numpy as np
 
@@ -36,6 +37,14 @@ class Motion:
     stop: int = 0
     cycles: int | None = None
 
+    def _repr_html_(self) -> str:
+        """For a notebook: length and cycles in a sentence, and a row of the extreme angles of each joint."""
+        rows = "".join(f"<tr><td>{escape(j)}</td><td>{a.min():.1f}</td><td>{a.max():.1f}</td></tr>"
+                       for j, a in zip(self.joints, np.rad2deg(self.angles).T))
+        return (f"<p>{escape(self.name)}: {len(self.times) - 1} poses in {self.times[-1] - self.times[0]:.2f} s"
+                f"{'' if self.closes else '; the last pose is not the first'}</p>"
+                f"<table><tr><th>joint</th><th>lowest [deg]</th><th>highest [deg]</th></tr>{rows}</table>")
+
     def __post_init__(self) -> None:
         if self.angles.shape != (len(self.times), len(self.joints)):
             raise InputError(self.source, f"expected angles for {len(self.times)} times and {len(self.joints)} joints")
@@ -48,7 +57,7 @@ class Motion:
             raise InputError(self.source, f"{said}: expected a pose of the loop, too")
         twice = [j for i, j in enumerate(self.joints) if j in self.joints[:i]]
         if twice:
-            raise InputError(self.source, f"joint '{twice[0]}' stands there twice")
+            raise InputError(self.source, f"joint '{twice[0]}' is given twice")
         for k, i in np.argwhere(~np.isfinite(self.angles))[:1]:
             raise InputError(
                 self.source, f"row {k + 1}, joint {self.joints[i]}: expected a finite angle, got {self.angles[k, i]}")

@@ -38,7 +38,7 @@ def load_trajectory(path: str | Path, which: str = "") -> Motion:
 
 
 def trajectories(path: str | Path) -> list[Any]:
-    """The messages of all joint trajectories in a bag, in the order of their times; InputError where it cannot be read."""
+    """The joint-trajectory messages of a bag, in the order of their times; InputError where it cannot be read."""
     try:
         return _messages(Path(path))
     except Exception as e:

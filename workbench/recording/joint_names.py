@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from workbench.files import InputError
 from workbench.files.errors import MistypedError
+from workbench.files.nearest import did_you_mean
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
 
@@ -28,7 +29,8 @@ def named_by_model(recording: Recording, model: RobotModel) -> Recording:
         return _renamed(recording, recording.aliases)
     unknown = [j for j in joints if j not in model.joints]
     if unknown:
-        raise MistypedError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
+        raise MistypedError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}"
+                            + did_you_mean(unknown[0], model.joints))
     return recording
 
 

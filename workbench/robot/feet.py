@@ -55,6 +55,21 @@ def foot_points(model: RobotModel) -> dict[str, Points]:
     return {foot: shapes[link] for foot, link in model.foot_links.items() if link in shapes}
 
 
+def tips(model: RobotModel) -> dict[str, Array]:
+    """The tip (3,) [m] of each link without a child, in its frame: the mean of its collision points farthest from its origin,
+    else twice its centre of mass."""
+    k = model.kinematics
+    shapes, carrying = _shapes(model.path), {frame.parent for frame in k.frames.values()}
+    out = {}
+    for link in k.links:
+        if link in carrying:
+            continue
+        points = shapes[link][0] if link in shapes else 2 * np.atleast_2d(k.centers.get(link, np.zeros(3)))
+        away = np.linalg.norm(points, axis=1)
+        out[link] = points[away >= 0.9 * away.max()].mean(axis=0)
+    return out
+
+
 def legs(model: RobotModel) -> dict[str, tuple[str, ...]]:
     """Foot -> the joints that move this foot alone, from the trunk on."""
     k = model.kinematics

@@ -7,12 +7,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
 
 from workbench.files import InputError
+from workbench.files.nearest import did_you_mean
 from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
@@ -53,6 +55,11 @@ class EffectSpec:
     effect: str
     where: tuple[str, ...] = ()
     parameters: Mapping[str, float | tuple[float, float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.where, str):
+            raise InputError(None, f"effect '{self.effect}': where: expected a tuple of names, as ('{self.where}',), got "
+                                   f"'{self.where}'")
 
 
 @dataclass(frozen=True)
@@ -129,7 +136,14 @@ class RobotModel:
         return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
-        """The same robot with one effect more."""
+        """The same robot with one effect more. InputError where it names a part that the robot does not have; whether the effect
+        is known and its numbers are possible is checked where a station is made of it, or the model saved."""
+        k = self.kinematics
+        parts = {*self.joints, *k.links, *self.foot_links, *self.rigid_bodies}
+        strange = [name for name in effect.where if name not in parts]
+        if strange:
+            raise InputError(None, f"effect '{effect.effect}': where: the robot has no '{strange[0]}'"
+                                   f"{did_you_mean(strange[0], parts)}")
         return self.with_effects((*self.effects, effect))
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
@@ -187,6 +201,18 @@ class RobotModel:
                 for e in self.effects
             ],
         }
+
+    def _repr_html_(self) -> str:
+        """For a notebook: the tree in a sentence, and a row for each joint's servo and range."""
+        k = self.kinematics
+        rows = "".join(
+            f"<tr><td>{escape(j)}</td><td>{escape(k.frames[j].child)}</td><td>{escape(s.model)}</td><td>{s.torque_at_full_duty:.2f}</td>"
+            f"<td>{math.degrees(k.frames[j].lower):.0f} to {math.degrees(k.frames[j].upper):.0f}</td></tr>"
+            for j, s in ((j, self.servo(j)) for j in self.joints))
+        effects = ", ".join(escape(" ".join([e.effect, *e.where])) for e in self.effects) or "none"
+        heads = "".join(f"<th>{head}</th>" for head in ("joint", "link", "servo", "stall torque [N m]", "range [deg]"))
+        return (f"<p>{escape(Path(self.description).name)}: base {escape(self.base)}, {k.mass:.3f} kg, "
+                f"{len(self.joints)} joints; effects: {effects}</p><table><tr>{heads}</tr>{rows}</table>")
 
     def check_base(self, floating: bool) -> None:
         """InputError unless the base is a link of the model, and the root of its tree where it has to float."""

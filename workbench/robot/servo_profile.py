@@ -94,8 +94,9 @@ class ServoProfile:
     with protocol 2 alarms are bits of the register hardware_error and refusals numbers. position_mode: register values of plain
     position control. unlock: register that allows the EEPROM to be written. watchdog: register and its unit [s] with which a
     servo stops automatically when the bus falls silent. maker: manufacturer, for its recommendations. group_read: how many are
-    asked at once: Sync Read of protocol 2, Feetech's, or "" for one after the other. marker: a register without effect on the
-    joint that is reset when the servo restarts.
+    asked at once: Sync Read of protocol 2, Feetech's, Bulk Read of protocol 1, or "" for one after the other. fast_read: firmware
+    from which Fast Sync Read is answered, too. marker: a register without effect on the joint,
+    reset when the servo restarts.
     """
 
     name: str
@@ -124,7 +125,8 @@ class ServoProfile:
     watchdog: tuple[str, float] | None = None
     marker: str | None = None
     maker: str = ""
-    group_read: Literal["", "sync", "feetech"] = ""
+    group_read: Literal["", "sync", "feetech", "bulk"] = ""
+    fast_read: int | None = None
     source: str = field(default="", compare=False)
 
     @property

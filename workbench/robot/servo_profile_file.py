@@ -32,7 +32,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
-                  "unlock", "watchdog", "marker", "maker", "group_read", *TOLERANCES)
+                  "unlock", "watchdog", "marker", "maker", "group_read", "fast_read", *TOLERANCES)
     position, speed, load = (_required_section(top, key) for key in ("position", "speed", "load"))
     registers = _registers(_required_section(top, "registers"))
     profile = ServoProfile(
@@ -51,7 +51,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         alarms=_names(_required_section(top, "alarms")), refusals=_names(_required_section(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
         marker=_marker(top, registers), maker=top.text("maker") or "",
-        group_read=_group_read(top), source=str(path))
+        group_read=_group_read(top), fast_read=top.whole("fast_read"), source=str(path))
     if profile.protocol not in (1, 2):
         raise top.error("protocol", f"expected 1 or 2, got {profile.protocol}")
     for f in (position, speed, load, top):
@@ -82,7 +82,7 @@ def servo_profile(model: str) -> ServoProfile:
     if profile is not None:
         return profile
     raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
-                           f"profile of its own ({_plain(model)}.yaml; docs/extending.md says how), as its counts are unknown")
+                           f"profile of its own ({_plain(model)}.yaml; see docs/extending.md), as its counts are unknown")
 
 
 def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:
@@ -237,10 +237,10 @@ def _marker(f: Fields, registers: Mapping[str, Register]) -> str | None:
     return name
 
 
-def _group_read(f: Fields) -> Literal["", "sync", "feetech"]:
+def _group_read(f: Fields) -> Literal["", "sync", "feetech", "bulk"]:
     said = f.text("group_read") or ""
-    if said not in ("", "sync", "feetech"):
-        raise f.error("group_read", f"expected sync or feetech, got {said!r}")
+    if said not in ("", "sync", "feetech", "bulk"):
+        raise f.error("group_read", f"expected sync, feetech or bulk, got {said!r}")
     return said  # type: ignore[return-value]  # one of them
 
 

@@ -11,6 +11,7 @@ from workbench.device.bus.survey import family_of
 from workbench.device.capture.virtual_motive import Pose, Scene
 from workbench.device.virtual import (
     AX12A,
+    MX28,
     SECOND,
     STS3215,
     XL330,
@@ -34,7 +35,7 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import BaseState, Simulation
 from workbench.types import Array
 
-FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
+FAMILIES = {"AX-12A": AX12A, "MX-28": MX28, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
 """Families of which there is a virtual servo, by the name of their profile."""
 PIVOT = 0.012
 """How far a rigid body's pivot may lie from its link's origin, along each axis [m]: as wide as a marker cluster."""

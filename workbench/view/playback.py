@@ -45,7 +45,8 @@ def since_start(take: Take) -> Array:
 def names_of(simulated: Take, recorded: Take | None) -> tuple[str, str]:
     """Names of the two takes in a legend: simulated and measured, or, for two simulations, their own names."""
     if recorded is None or recorded.source != "simulation":
-        return "simulated", "measured"
+        unseen = recorded is not None and recorded.base == "free" and recorded.p_WB is None
+        return "simulated", "measured joints, body not recorded" if unseen else "measured"
     a, b = simulated.name, recorded.name
     return (a, b) if a != b else (f"{a} (1)", f"{b} (2)")
 
@@ -71,7 +72,7 @@ def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback]
         links = _seen_from(links, model.base)
     p, R = _base(take, time, clock)
     if p is None or R is None:
-        p, R = _rest_pose(time, like[1] if like else None)
+        p, R = _unrecorded_base(time, like[1] if like else None, take.base == "fixed")
     elif like is not None:
         p, R = _laid_over(p, R, like[1], take.zeroed)
     played = Playback(time, q, p, R, links)
@@ -118,10 +119,12 @@ def _interpolate(time: Array, clock: Array, values: Array) -> Array:
     return np.asarray(a + (b - a) * share[:, None], dtype=float)
 
 
-def _rest_pose(time: Array, other: Playback | None) -> tuple[Array, Array]:
-    """A base that nobody followed: where the other take's stood at first, else level."""
-    p, R = (other.base_p[0], other.base_R[0]) if other is not None else (np.zeros(3), np.eye(3))
-    return np.tile(p, (len(time), 1)), np.tile(R, (len(time), 1, 1))
+def _unrecorded_base(time: Array, other: Playback | None, held: bool) -> tuple[Array, Array]:
+    """A base that was not recorded: where the other take's is, or, if it was held, where that was at first; else level."""
+    if other is not None:
+        still = np.zeros(len(time), dtype=int) if held else np.arange(len(time))
+        return other.base_p[still], other.base_R[still]
+    return np.zeros((len(time), 3)), np.tile(np.eye(3), (len(time), 1, 1))
 
 
 def _on_a_stand(played: Playback, model: RobotModel) -> Playback:

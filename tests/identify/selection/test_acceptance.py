@@ -14,7 +14,7 @@ from workbench.identify.proposals import candidates
 from workbench.identify.selection import acceptance
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE
-from workbench.identify.selection.record import SelectionStep, before_rough, taken
+from workbench.identify.selection.record import SelectionStep, accepted_effects, before_rough
 
 
 def leaving(worn, **sizes):
@@ -171,7 +171,7 @@ def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
     rounds = [SelectionStep("nominal", (), clock), SelectionStep("nominal", (), frame)]
     assert before_rough(rounds, now) is now
     assert before_rough([*rounds, SelectionStep("seen rightly", (), sag)], now) == "seen rightly"
-    assert taken([*rounds, SelectionStep("seen rightly", (), sag)]) == [*sag]
+    assert accepted_effects([*rounds, SelectionStep("seen rightly", (), sag)]) == [*sag]
 
 
 @pytest.mark.parametrize(("walks", "brings", "told"), [(True, 100.0, True), (True, 900.0, False), (False, 100.0, False)])

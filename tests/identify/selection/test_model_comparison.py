@@ -28,7 +28,7 @@ from workbench.identify.selection.odds import (
 )
 from workbench.identify.selection.options import ODDS, SCHEDULING
 from workbench.identify.selection.record import SelectionResult, SelectionStep
-from workbench.identify.selection.rivals import put_in_place, rivals_near
+from workbench.identify.selection.rivals import replace_effect, rivals_near
 from workbench.identify.selection.screening import tried
 
 
@@ -152,7 +152,7 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
     fit = search.evaluated([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
     astray = CandidateFit(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
     seen = []
-    part = put_in_place(search, fit, 0, astray)
+    part = replace_effect(search, fit, 0, astray)
     questions = next(part)
     try:
         while True:

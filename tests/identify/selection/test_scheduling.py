@@ -104,7 +104,7 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
     pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
     for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
-        asked_of = [scheduling.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.fixed_base, tier)[0]
+        asked_of = [scheduling.groups_to_try(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.fixed_base, tier)[0]
                     for tier in range(SCHEDULING.tiers)]
         assert [g for g in asked_of if g] == groups
 
@@ -118,7 +118,7 @@ def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while
                          (False, True, True, True))
     band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
     groups = [g for tier in range(SCHEDULING.tiers)
-              for g in scheduling.asked(search, [mount, band], nominal, {well: 3.0}, search.fixed_base, tier)[0]]
+              for g in scheduling.groups_to_try(search, [mount, band], nominal, {well: 3.0}, search.fixed_base, tier)[0]]
     assert groups == [[mount]]
 
 
@@ -128,7 +128,7 @@ def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn
 
     def asked_of(*joints):
         beyond = dict.fromkeys(joints, 3.0)
-        return [[c for g in scheduling.asked(search, pool, nominal, beyond, search.fixed_base, tier)[0] for c in g]
+        return [[c for g in scheduling.groups_to_try(search, pool, nominal, beyond, search.fixed_base, tier)[0] for c in g]
                 for tier in range(SCHEDULING.tiers)]
 
     of_all, at_joints, *others = asked_of("one", "two", "three")[1:]
@@ -149,7 +149,7 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
     search = Search(search.evaluator.on([seen]), session.model)
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
     groups = [g for tier in range(SCHEDULING.tiers)
-              for g in scheduling.asked(search, pool, nominal, {"two": 3.0}, search.fixed_base, tier)[0]]
+              for g in scheduling.groups_to_try(search, pool, nominal, {"two": 3.0}, search.fixed_base, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
 
 
@@ -165,7 +165,8 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
     def tiers(heavy):
         monkeypatch.setattr(scheduling, "heavy_links", lambda model: heavy)
         return [tier for tier in range(SCHEDULING.tiers)
-                for g in scheduling.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.fixed_base, tier)[0]
+                for g in scheduling.groups_to_try(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.fixed_base,
+                                                  tier)[0]
                 for c in g if c is shift]
 
     assert tiers([link]) == [SCHEDULING.tiers_of_all - 1]

@@ -82,7 +82,7 @@ def test_sets_are_replaced_until_none_is_better_unless_the_first_leaves_no_more_
                                   for t in s}) for s in sets]
         return sorted(zip(fits, sets), key=lambda f: f[0].cost["choose"])
 
-    monkeypatch.setattr(swap, "_fitted", fitted)
+    monkeypatch.setattr(swap, "_fit_sets", fitted)
     (fit, chosen), *rest = swap.best_sets(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
     assert {t.candidate.name for t in chosen} == {"viscous_friction", "dead_band" if replaced else "backlash"}
     assert bool(rest) is replaced

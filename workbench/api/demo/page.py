@@ -131,7 +131,7 @@ def _walk_section(rows: list[Row], takes: Mapping[str, Take], model: RobotModel,
               "Where the body was after six seconds, from rest at the origin.", emphasis=range(len(THESIS), len(rows))),
         Picture(body_path(main, others=dict(others)), "The same walk four ways: how far drive and contact model alone take it."),
         Replay(replay, f"{label}, with the ground's forces.", film_strip(model, main)),
-        Picture(footfalls(stance, span=(0.0, SECONDS)), f"When each foot stands: {label}."),
+        Picture(footfalls(stance, span=(0.0, SECONDS)), f"Stance of each foot: {label}."),
         Details("Angles, torques, attitude", [
             Picture(joint_grid(main, stance=by_joint(stance, model)),
                     "Each joint, commanded and simulated; the foot's stance is shaded."),

@@ -7,14 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
 
 from workbench.device.bus import group
-from workbench.device.bus.errors import BusError, NoAnswerError
+from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
 from workbench.device.bus.ports import GONE, StripEcho, gone
-from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, ping
+from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, parameters_of, ping, read_packet
 from workbench.robot.servo_profile import Register, ServoProfile
 
 T = TypeVar("T")
@@ -37,8 +37,8 @@ class Bus:
     port: dynamixel-sdk's, with `pause` and `patience` (`SerialPort`, or a virtual one). joints: by ID, for messages.
     alarms: state in each servo's last answer. retries: by ID, how often it had to be asked again.
     strip_echo: for an adapter that is known to hear itself; any other that does is refused. latency: delay of answers
-    beyond their bytes [s], once it was measured. asked: when the last byte of the last question was out [s], since the servo
-    answers with its state at that time.
+    beyond their bytes [s], once it was measured. group_kind: how many servos are asked at once, "" for one after the
+    other. asked: when the last byte of the last question was out [s], since the servo answers with its state at that time.
     """
 
     def __init__(self, port: Any, profile: ServoProfile, joints: Mapping[int, str] | None = None,
@@ -49,6 +49,7 @@ class Bus:
         self.retries: Counter[int] = Counter()
         self._handler = PacketHandler(float(profile.protocol))
         self.latency, self.asked = 0.0, 0.0
+        self.group_kind: group.Kind | Literal[""] = profile.group_read
         if strip_echo:
             self.port = StripEcho(port)
         elif self._guarded(lambda: hears_itself(port, profile.protocol)):
@@ -85,8 +86,8 @@ class Bus:
 
         def call() -> tuple[bytes, int, int]:
             self.asked = self.now() + (8 if self.profile.protocol == 1 else 14) * self.port.tx_time_per_byte / 1000
-            answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
-            return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
+            answer, result, error = self._handler.txRxPacket(self.port, read_packet(self.profile.protocol, servo, first, count))
+            return parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
 
         data = self._ask(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
@@ -135,7 +136,7 @@ class Bus:
     def read_all(self, servos: Sequence[int], *names: str) -> dict[int, dict[str, int]]:
         """Registers of many servos by one question that they answer in turn, asked once, where the family can; by ID, without
         those of which no whole answer came. Where one is silent, those after it may be, too."""
-        kind = self.profile.group_read
+        kind = self.group_kind
         if not kind:
             raise ValueError(f"{self.profile.name} cannot be asked all at once")
         wanted = [self._register(name) for name in names]
@@ -143,7 +144,7 @@ class Bus:
         count = max(r.address + r.size for r in wanted) - first
         packet = group.question(kind, servos, first, count)
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
-        heard = self._guarded(lambda: self._collect(packet, len(servos) * group.answer_length(kind, count)))
+        heard = self._guarded(lambda: self._collect(packet, group.reply_length(kind, len(servos), count)))
         out = {}
         for servo, (error, data) in group.answers(kind, heard, count, servos).items():
             self._look(servo, error)
@@ -185,10 +186,27 @@ class Bus:
     def release(self, servos: Iterable[int]) -> None:
         """Torque off, broadcast twice, as nobody answers; never raises for a servo, only where the port is gone."""
         off = {servo: {"torque_enable": 0} for servo in servos}
-        if off:
+        for _ in range(2 if off else 0):
             self.sync_write(off)
             self.pause(0.002)
-            self.sync_write(off)
+
+    def let_go(self, servos: Iterable[int], seconds: float = 1.0) -> tuple[int, ...]:
+        """Torque off, read back, and written again for so long [s] to servos that do not confirm it: a packet with a wrong length
+        may have swallowed the ones after it. Returns the servos whose torque is unknown."""
+        waiting, end = list(servos), self.now() + seconds
+        while True:
+            self.release(waiting)
+            for servo in list(waiting):
+                try:
+                    if not self.read(servo, "torque_enable")["torque_enable"]:
+                        waiting.remove(servo)
+                except PortGoneError:
+                    raise
+                except BusError:
+                    continue
+            if not waiting or self.now() >= end:
+                return tuple(waiting)
+            self.pause(0.02)
 
     def find(self, servos: Iterable[int]) -> dict[int, int]:
         """Model numbers of those that answer, by ID; asked once each, the silent ones twice."""
@@ -275,18 +293,6 @@ class Bus:
             raise gone(e) from None
         finally:
             self.port.is_using = False
-
-    def _read_packet(self, servo: int, address: int, count: int) -> list[int]:
-        """As the SDK's packet handlers want it: header and checksum are theirs to fill in."""
-        if self.profile.protocol == 1:
-            return [0, 0, servo, 4, 2, address, count, 0]
-        return [0, 0, 0, 0, servo, 7, 0, 2, address & 0xFF, address >> 8, count & 0xFF, count >> 8, 0, 0]
-
-    def _parameters(self, answer: list[int]) -> bytes:
-        """Those that the answer itself says it has: the SDK's readTxRx takes the checksum for data where there are fewer."""
-        if self.profile.protocol == 1:
-            return bytes(answer[5:answer[3] + 3])
-        return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
 
 
 def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:

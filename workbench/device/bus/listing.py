@@ -23,9 +23,9 @@ FEW = range(1, 21)
 
 
 def list_servos(port: Any, strip_echo: bool = False, progress: Progress | None = None) -> tuple[Survey, ...]:
-    """One survey, without joints, for each family on the bus. Where nobody answers at the port's bit rate, the others are tried,
+    """One survey, without joints, for each family on the bus. If no servo answers at the port's bit rate, others are tried,
     and the port keeps the first at which somebody does. Servos of an unknown model are included in the first survey of their
-    protocol, without registers. BusError where nobody answers at all."""
+    protocol, without registers. BusError where no servo answers at all."""
     tell = progress or (lambda what, done: None)
     own = int(port.getBaudRate())
     answered = _who(port, strip_echo, ALL_IDS, lambda done: tell("looking at each ID", done))
@@ -33,12 +33,12 @@ def list_servos(port: Any, strip_echo: bool = False, progress: Progress | None =
     for k, rate in enumerate(rates):
         if answered:
             break
-        tell(f"nobody answers at {own} bit/s; trying {rate}", k / len(rates))
+        tell(f"no servo answers at {own} bit/s; trying {rate}", k / len(rates))
         if port.setBaudRate(rate) and _who(port, strip_echo, FEW):
             answered = _who(port, strip_echo, ALL_IDS)
     if not answered:
         port.setBaudRate(own)
-        raise BusError(f"nobody answers, at {own} bit/s or any other; is the servos' power on, and is this the right port?")
+        raise BusError(f"no servo answers, at {own} bit/s or any other; is the servos' power on, and is this the right port?")
     out = []
     for protocol, ids in answered.items():
         out += _surveys(port, strip_echo, protocol, ids, tell)

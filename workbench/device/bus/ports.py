@@ -119,4 +119,4 @@ def serial_ports(usb: bool = False) -> list[str]:
 
 def gone(error: BaseException) -> PortGoneError:
     """The error to raise where the operating system has lost the adapter."""
-    return PortGoneError(f"the adapter is gone ({' '.join(str(error).split())}); plug it in again and repeat the command")
+    return PortGoneError(f"the adapter has disconnected ({' '.join(str(error).split())}); reconnect it and repeat the command")

@@ -8,6 +8,7 @@ from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.files import InputError
+from workbench.files.nearest import did_you_mean
 from workbench.robot import RobotModel, bus_ids
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.ranges import joint_ranges
@@ -42,8 +43,8 @@ def wider_limits(model: RobotModel, found: Survey) -> tuple[str, ...]:
 
 
 def set_up(bus: Bus, model: RobotModel, found: Survey) -> Iterator[str]:
-    """Writes what differs, servo by servo, and yields a line for each register. BusError where a servo has its torque on, as its
-    EEPROM cannot be written then or the robot may move, or where a register does not keep what was written."""
+    """Writes the differing registers, servo by servo, and yields a line for each. BusError where a servo has its torque on, as
+    its EEPROM cannot be written then or the robot may move, or where a register does not keep the written value."""
     on = [servo for servo in found.found.values() if servo.joint and servo.registers.get("torque_enable")]
     if on:
         raise BusError("its torque is on; switch the robot off and on before its registers are written", on[0].id, on[0].joint)
@@ -60,7 +61,8 @@ def set_id(bus: Bus, model: RobotModel, found: Survey, joint: str) -> str:
     """Gives the one servo on the bus the ID of a joint; InputError where there are several."""
     ids = bus_ids(model)
     if joint not in ids:
-        raise InputError(model.description, f"the robot has no joint '{joint}'; its joints: {' '.join(model.joints)}")
+        raise InputError(model.description, f"the robot has no joint '{joint}'; its joints: {' '.join(model.joints)}"
+                             + did_you_mean(joint, model.joints))
     if len(found.found) != 1 or found.doubled:
         count = len(found.found) + len(found.doubled)
         raise BusError(f"{count} IDs answer; expected one servo alone on the bus to give it the ID of {joint}")

@@ -124,6 +124,9 @@ def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
         if servo not in doubled:
             joint = joints.get(servo)
             found[servo] = _describe_servo(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
+    fast = bus.profile.fast_read
+    if fast is not None and found and all(s.registers.get("firmware_version", 0) >= fast for s in found.values()):
+        bus.group_kind = "fast"
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
     return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
 
@@ -173,7 +176,7 @@ def _mode(servo: FoundServo, profile: ServoProfile) -> Iterable[str]:
     if r["cw_angle_limit"] == r["ccw_angle_limit"]:
         yield f"both angle limits are {r['cw_angle_limit']}: it turns without end (wheel mode); set them with --write"
     if r["torque_limit"] == 0 or r["max_torque"] == 0:
-        yield "its torque is limited to nothing: an alarm shut it down, or somebody set it so; switch its power off and on"
+        yield "its torque is limited to nothing: an alarm shut it down, or a person did; switch its power off and on"
     for name, expected in profile.position_mode.items():
         if r[name] != expected:
             yield f"{name} is {r[name]}; expected {expected}, for plain position control"
@@ -191,5 +194,5 @@ def _nobody(bus: Bus, wanted: list[int]) -> BusError:
     elsewhere = bus.find_at_any_rate(wanted)
     if elsewhere:
         other, servos = max(elsewhere.items(), key=lambda item: len(item[1]))
-        return BusError(f"nobody answers at {rate} bit/s, but {len(servos)} do at {other}; say --rate {other}")
-    return BusError(f"nobody answers, at {rate} bit/s or any other; is the servos' power on, and is this the right port?")
+        return BusError(f"no servo answers at {rate} bit/s, but {len(servos)} do at {other}; say --rate {other}")
+    return BusError(f"no servo answers, at {rate} bit/s or any other; is the servos' power on, and is this the right port?")

@@ -29,6 +29,20 @@ def ping(protocol: int, servo: int) -> bytes:
     return head + crc16(head).to_bytes(2, "little")
 
 
+def read_packet(protocol: int, servo: int, address: int, count: int) -> list[int]:
+    """A READ as the SDK's packet handlers take it; they fill in header and checksum."""
+    if protocol == 1:
+        return [0, 0, servo, 4, 2, address, count, 0]
+    return [0, 0, 0, 0, servo, 7, 0, 2, address & 0xFF, address >> 8, count & 0xFF, count >> 8, 0, 0]
+
+
+def parameters_of(protocol: int, answer: list[int]) -> bytes:
+    """As many as the answer's own length says: the SDK's readTxRx takes the checksum for data where there are fewer."""
+    if protocol == 1:
+        return bytes(answer[5:answer[3] + 3])
+    return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
+
+
 def hear(port: Any, data: bytes, most: int, patience: float) -> bytes:
     """Everything received within the time of `most` bytes and `patience` [ms] after a packet."""
     port.clearPort()

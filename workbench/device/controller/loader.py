@@ -47,8 +47,8 @@ class LoadError(RuntimeError):
 UNTOUCHED = "the controller holds the program that it held before"
 ASKED = "LOAD was sent and not answered, so the old program may or may not be erased; the loader is whole"
 HALF = "the old program may be erased and the new one is not whole, so it may run nothing; its loader is whole"
-MOVES = ("The robot will move: once started, the program asks all servos, gives them torque and takes them to neutral, slowly. "
-         "Put it on a stand, with a hand on its switch.")
+MOVES = ("The robot will move: once started, the program checks all servos, switches their torque on and moves them "
+         "slowly to neutral. Put it on a stand, with a hand on its switch.")
 UNKNOWN = "the image was sent whole, but the loader did not confirm it; the new program may or may not run"
 LOADED = "the new program is loaded but was not seen to start"
 AGAIN = "switch it off, and run this again"

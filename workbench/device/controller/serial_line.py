@@ -56,7 +56,7 @@ class SerialLine:
         except Exception as e:
             if type(e).__module__ != "termios":
                 raise
-            raise OSError(5, "the adapter is gone") from None
+            raise OSError(5, "the adapter has disconnected") from None
 
 
 def default_port() -> str:

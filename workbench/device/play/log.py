@@ -16,10 +16,10 @@ from workbench.recording.formats.joint_log import write_joint_log
 from workbench.types import Array, Mask
 
 NEAR = 0.002
-"""A row holds what was read within so long of it [s], moved to the row's time along the line between two readings: at 200 deg/s
-and a corner in between that is wrong by 0.4 deg at worst."""
+"""A row holds readings within this time of it [s], moved to the row's time along the line between two readings: at 200 deg/s
+with a corner in between, the error is 0.4 deg at worst."""
 HOLE = 0.05
-"""Readings farther apart than this say nothing of the speed between them [s]."""
+"""Between readings farther apart than this the speed is unknown [s]."""
 STILL = math.radians(0.5)
 """Two readings that differ by less say where a joint was between them, as long as no goal moves it [rad]."""
 LATE = 2.0
@@ -47,9 +47,10 @@ class _Content:
 
 
 def finish_log(journal: str | Path, log: str | Path) -> Path:
-    """Writes the joint log (docs/formats.md, section 3), whole or not at all. Time zero is when it has come to rest in neutral.
+    """Writes the joint log (docs/formats.md, section 3), complete or not at all. Time zero is when it has come to rest in
+    neutral.
 
-    A row at each pose, and one for what was read within 4 ms; goals and moving speeds as they were sent; positions where the
+    A row at each pose, and one for readings within 4 ms; goals and moving speeds as they were sent; positions where the
     servo was read then, else blank. InputError where nothing was read.
     """
     content = _read(journal)
@@ -81,7 +82,7 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
 
 
 def _rows(start: float, poses: Array, read: Array) -> Array:
-    """Times of the rows: the start, each pose, and the middle of what was read within twice NEAR, where no pose is near."""
+    """Times of the rows: the start, each pose, and the middle of readings within twice NEAR, where no pose is near."""
     fixed = np.unique(np.concatenate([[start], poses]))
     out, group = list(fixed), list[float]()
     for t in [*np.sort(read[read >= start]).tolist(), math.inf]:
@@ -120,7 +121,7 @@ def _possible(rows: Array) -> Mask:
 
 
 def _position(time: Array, known: Array, values: Array, moved: float) -> Array:
-    """What was read near each row; before the first pose, and where two readings agree, what lies between them as well."""
+    """Readings near each row; before the first pose, and where two readings agree, all rows between them as well."""
     after = np.clip(np.searchsorted(known, time, side="left"), 1, len(known) - 1)
     gap = known[after] - known[after - 1]
     nearest = np.minimum(np.abs(known[after] - time), np.abs(known[after - 1] - time))
@@ -159,7 +160,7 @@ def _take(content: _Content, entry: Mapping[str, Any]) -> None:
 
 
 def _rest_begins(content: _Content) -> float:
-    """When the rest in neutral begins; where it never came to that, when the first goal of all was sent."""
+    """When the rest in neutral begins; if it never came to that, when the very first goal was sent."""
     return content.rests[0] if content.rests else content.sent[0][0]
 
 

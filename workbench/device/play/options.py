@@ -12,14 +12,14 @@ from pathlib import Path
 class PlayOptions:
     """How a motion is played.
 
-    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of
-    a ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within:
-    how long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there
-    itself before it is let down onto its droop [rad]; seat_seconds: how long it gets for that, and then to come to rest [s].
-    rest: how long the robot stands in neutral before the first pose and after the last [s]; a recording needs half a second of
-    it. watchdog: silence after which servos that can stop by themselves do [s]. start_torque: share of the torque limit that the
-    servos get for the first way to neutral, so that a joint that is caught somewhere is not torn off. torque: the same for the
-    motion. hold: torque stays on at the end.
+    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of the speed of an AX-12. step: between the goals of
+    a ramp [s]. arrive: largest distance of a joint from its goal at the end [rad], beyond its droop under the robot's weight;
+    within: longest time beyond the ramp [s]. seat: largest offset beyond neutral that a joint is sent, so that it reaches neutral
+    before it is let down onto its droop [rad]; seat_seconds: time for that, and then to come to rest [s].
+    rest: time in neutral before the first pose and after the last [s]; a recording needs half a second of it.
+    watchdog: silence after which servos with a watchdog stop [s]. start_torque: share of the torque limit on the first way to
+    neutral, so that a joint that is caught somewhere is not torn off. torque: the same for the motion. hold: torque stays on at
+    the end.
     """
 
     ramp_speed: float = 0.6
@@ -39,10 +39,10 @@ class PlayOptions:
 class Played:
     """How it went. started: when the first pose was sent, ended: when the last one's dwell was over or the motion was stopped,
     on the bus's clock [s]. worst_late: by which a pose was late [s]. stopped: why it ended early, "" where it did not. released:
-    whether torque is off. unknown: joints that did not say so when they were asked. rates: readings of each joint in the motion,
-    a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time, and poses
-    sent only when the next one was due. log_problem: why there is no joint log, "" where there is one. log_start: time zero of
-    the log, on the bus's clock [s]; NaN where nobody knows."""
+    whether torque is off. unknown: joints that did not confirm it when they were asked. rates: readings of each joint in the
+    motion, a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time,
+    and poses sent only when the next one was due. log_problem: why there is no joint log, "" where there is one. log_start: time
+    zero of the log, on the bus's clock [s]; NaN where unknown."""
 
     journal: Path
     started: float

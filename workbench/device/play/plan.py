@@ -36,7 +36,7 @@ def reading_plan(bus: Bus, servos: int, commands: Commands, watching: WatchOptio
     """From the adapter's latency, as it was measured, the bytes, and the time that poses leave. InputError where the watch would
     be blind for so long that it would have to end the motion."""
     byte, profile = float(bus.port.tx_time_per_byte) / 1000, bus.profile
-    kind = profile.group_read
+    kind = bus.group_kind
     if kind:
         reading = (servos + 14 + servos * answer_length(kind, STATE_BYTES)) * byte + bus.latency
         needed = 1

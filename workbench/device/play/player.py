@@ -26,8 +26,8 @@ def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop
          options: PlayOptions | None = None, watching: WatchOptions | None = None, progress: Progress | None = None) -> Played:
     """Plays commands on the servos of a survey that had no problems.
 
-    stop(): why it should end, "" as long as it should not (a signal); where what it says changes, torque goes off at once.
-    BusError where the bus fails before anything moved, or for good; then what is left of the bus has been told to release.
+    stop(): the reason to end, "" while there is none; when it changes a second time, torque goes off at once. BusError where the
+    bus fails before anything moved, or for good; all servos that can still be reached have then been released.
     """
     ids = {servo.joint: servo.id for servo in found.found.values() if servo.joint is not None}
     unknown = [joint for joint in commands.joints if joint not in ids]
@@ -124,7 +124,7 @@ class _Performance:
         for joint, angle in self.goals.items():
             low, high = self.rig.servos[joint].range
             if not low <= angle <= high:
-                raise BusError(f"stands at {math.degrees(angle):.0f} deg, beyond the range of its goals; turn it back by hand",
+                raise BusError(f"is at {math.degrees(angle):.0f} deg, beyond the range of its goals; turn it back by hand",
                                self.rig.ids[joint], joint)
 
     def _ramp(self, target: Mapping[str, float], what: str) -> None:
@@ -156,8 +156,8 @@ class _Performance:
             if bus.now() >= end:
                 joint, angle = next(iter(far.items()))
                 stands, wanted = math.degrees(angle), math.degrees(target[joint])
-                raise StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): stands at {stands:.0f} deg and not "
-                                                     f"at {wanted:.0f}; what holds it?"))
+                raise StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): is at {stands:.0f} deg instead of "
+                                                     f"{wanted:.0f}; what holds it?"))
 
     def _seat(self, target: Mapping[str, float]) -> None:
         """Brings each joint onto its goal itself, by as much beyond it as it hangs below, then tells all the goal at once. So
@@ -222,8 +222,8 @@ class _Performance:
             raise StopError(Reaction(how, asked))
 
     def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
-        """Does what the reaction says, and says why, and what came in between. On the way to neutral only what releases, or a
-        second signal, ends it."""
+        """Carries out the reaction and returns its reason, with any that came on the way to neutral; there, only reactions that
+        release, or a second signal, count."""
         rig = self.rig
         if math.isnan(self.ended):
             self.ended, self.read = rig.bus.now(), rig.readings - self.read_before
@@ -251,13 +251,13 @@ class _Performance:
             self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
 
     def _let_go(self) -> bool:
-        """On a bus that may be gone; whether it could be told."""
+        """On a bus that may be gone; whether all servos have confirmed it."""
         try:
-            self.rig.bus.release(self.rig.ids.values())
+            unknown = self.rig.release()
             self.rig.limit_torque(1)
         except (BusError, InputError):
             return False
-        return True
+        return not unknown
 
 
 def _time(bus: Bus) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from workbench.device.bus.bus import Bus
-from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
+from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.group import answer_length
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
@@ -139,22 +139,9 @@ class Rig:
     def release(self, seconds: float = RELEASE) -> tuple[str, ...]:
         """Torque off, broadcast and read back; repeated for so long [s] for servos that do not answer. Returns the joints
         whose state is unknown."""
-        bus, waiting, end = self.bus, dict(self.ids), self.bus.now() + seconds
-        while True:
-            bus.release(self.ids.values())
-            for joint, servo in list(waiting.items()):
-                try:
-                    if not bus.read(servo, "torque_enable")["torque_enable"]:
-                        del waiting[joint]
-                except PortGoneError:
-                    raise
-                except BusError:
-                    continue
-            if not waiting or bus.now() >= end:
-                break
-            bus.pause(0.02)
-        self.journal.write(t=bus.now(), torque=dict.fromkeys(self.ids, False))
-        return tuple(waiting)
+        unknown = self.bus.let_go(self.ids.values(), seconds)
+        self.journal.write(t=self.bus.now(), torque=dict.fromkeys(self.ids, False))
+        return tuple(joint for joint, servo in self.ids.items() if servo in unknown)
 
     def mark(self, on: bool) -> None:
         """Sets, or clears, the marker that a restart clears."""
@@ -166,7 +153,7 @@ class Rig:
         """Reads one servo after the other until `due` [s], as long as there is time for one more; ends early on `stop()` or where
         the watch reacts."""
         bus = self.bus
-        at_once = bool(bus.profile.group_read)
+        at_once = bool(bus.group_kind)
         turns, least = (1, ROUND_AT_ONCE) if at_once else (len(self._joints), ROUND)
         while not stop() and self.watch.reaction is None:
             before = bus.now()
@@ -221,7 +208,7 @@ class Rig:
         """How long one of many answers takes [s]."""
         wanted = [self.bus.profile.registers[name] for name in names]
         count = max(r.address + r.size for r in wanted) - min(r.address for r in wanted)
-        kind = self.bus.profile.group_read
+        kind = self.bus.group_kind
         return answer_length(kind, count) * float(self.bus.port.tx_time_per_byte) / 1000 if kind else 0.0
 
     def _read_one(self, joint: str, names: tuple[str, ...]) -> None:

@@ -97,7 +97,7 @@ class Watch:
             self._judge(servo, "heat", heat > limit - self._options.cooler or "heat" in alarms, "neutral",
                         f"{heat} deg C, its limit is {limit}")
         if volts is not None:
-            self._judge(servo, "dead", volts < low * self._options.dead, "release", f"{volts:.1f} V, the supply is gone")
+            self._judge(servo, "dead", volts < low * self._options.dead, "release", f"{volts:.1f} V, the supply has failed")
             self._judge(servo, "low", volts < low, "neutral", f"{volts:.1f} V, below {low:g} V")
         marker = self._profile.marker
         if marker and marker in values:

@@ -40,7 +40,7 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
     does not answer; InputError where it has no joint, or has torque already, as then something else moves it."""
     o, profile = options or WiggleOptions(), bus.profile
     if servo.joint is None:
-        raise InputError(None, f"servo {servo.id} is no joint of the model")
+        raise InputError(None, f"servo {servo.id} is not a joint of the model")
     if bus.read(servo.id, "torque_enable")["torque_enable"]:
         raise BusError("its torque is on; switch the robot off and on first", servo.id, servo.joint)
     here = bus.read(servo.id, "present_position")["present_position"]
@@ -65,9 +65,11 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
         go(here)
         bus.pause(o.by / o.speed + o.rest)
     finally:
-        bus.release([servo.id])
+        held = bus.let_go([servo.id])
         bus.sync_write({servo.id: {"torque_limit": limit}})
         bus.pause(0.002)
+    if held:
+        raise BusError("does not confirm that its torque is off; switch the robot's power off", servo.id, servo.joint)
     return Wiggled(servo.joint, servo.id, went, went < o.moved * o.by)
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
+from workbench.device.virtual import protocol2
 from workbench.device.virtual.clock import SECOND, Clock
-from workbench.device.virtual.protocol import BROADCAST, SYNC_READ, Instruction
+from workbench.device.virtual.protocol import BROADCAST, BULK_READ, FAST_SYNC_READ, SYNC_READ, Instruction
 
 if TYPE_CHECKING:
     from workbench.device.virtual.servo import VirtualServo
@@ -161,6 +162,15 @@ class ServoBus:
         if packet.instruction == SYNC_READ and packet.servo == BROADCAST and packet.intact:
             self._asked_in_turn(packet.parameters[:2], list(packet.parameters[2:]), key, end)
             return
+        if packet.instruction == FAST_SYNC_READ and packet.servo == BROADCAST and packet.intact:
+            what, ids = packet.parameters[:2], list(packet.parameters[2:])
+            length = (len(ids) * (what[1] + 4) + 1).to_bytes(2, "little")
+            self._one_packet(what, ids, key, end, protocol2.HEADER + b"\xfe" + length + bytes([protocol2.STATUS]), b"")
+            return
+        if packet.instruction == BULK_READ and packet.servo == BROADCAST and packet.intact:
+            count, address = packet.parameters[1], packet.parameters[3]
+            self._asked_in_turn(bytes([address, count]), list(packet.parameters[2::3]), key, end)
+            return
         for servo in self.servos:
             if packet.servo not in (servo.ident, BROADCAST) or servo is burst.talker:
                 continue
@@ -179,6 +189,17 @@ class ServoBus:
         answered = [end for end in ends if end is not None]
         if answered:
             self.clock.at(max(answered), partial(self._asked_in_turn, what, ids[1:], key, max(answered)))
+
+    def _one_packet(self, what: bytes, ids: list[int], key: tuple[int, int], time: int, head: bytes, so_far: bytes) -> None:
+        """Fast Sync Read: each adds its block when the one before it has; the first sends the head, too."""
+        if not ids:
+            return
+        there = [servo for servo in self.servos
+                 if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key]
+        said = [(end, data) for servo in there if (told := servo.add_block(what, time, head, so_far)) for end, data in [told]]
+        if said:
+            end, data = max(said)
+            self.clock.at(end, partial(self._one_packet, what, ids[1:], key, end, head, so_far + data))
 
     def _collide(self, one: Burst, two: Burst) -> None:
         """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""

@@ -101,6 +101,40 @@ _STS3215 = {
     "present_current": Kept(),
 }
 
+_MX28 = {
+    "model_number": Kept(29),
+    "firmware_version": Kept(36),
+    "baud_rate": Kept(1, (0, 254)),
+    "id": Kept(1, (0, 253)),
+    "return_delay_time": Kept(250, (0, 254)),
+    "cw_angle_limit": Kept(0, (0, 4095)),
+    "ccw_angle_limit": Kept(4095, (0, 4095)),
+    "temperature_limit": Kept(80, (0, 99)),
+    "min_voltage_limit": Kept(60, (50, 160)),
+    "max_voltage_limit": Kept(160, (50, 160)),
+    "max_torque": Kept(1023, (0, 1023)),
+    "status_return_level": Kept(2, (0, 2)),
+    "alarm_shutdown": Kept(36, (0, 127)),
+    "torque_enable": Kept(0, (0, 1)),
+    "led": Kept(0, (0, 1)),
+    "position_d_gain": Kept(0, (0, 254)),
+    "position_i_gain": Kept(0, (0, 254)),
+    "position_p_gain": Kept(32, (0, 254)),
+    "goal_position": Kept(2048, (0, 4095)),
+    "moving_speed": Kept(0, (0, 1023)),
+    "torque_limit": Kept(1023, (0, 1023)),
+    "present_position": Kept(2048),
+    "present_speed": Kept(),
+    "present_load": Kept(),
+    "present_voltage": Kept(120),
+    "present_temperature": Kept(30),
+    "registered": Kept(at=(44, 1)),
+    "moving": Kept(at=(46, 1)),
+    "lock": Kept(0, (0, 1)),
+    "punch": Kept(0, (0, 1023)),
+}
+
+MX28 = emulated("mx", "MX-28", 74, _MX28, refresh=0.0)
 XL330 = emulated("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
 XL430 = emulated("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
 STS3215 = emulated("sts3215", "STS3215", 71, _STS3215, refresh=0.0, eeprom_lock=1)

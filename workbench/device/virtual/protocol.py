@@ -9,6 +9,7 @@ from typing import Protocol as TypingProtocol
 
 BROADCAST = 0xFE
 PING, READ, WRITE, REG_WRITE, ACTION, RESET, REBOOT, SYNC_WRITE, SYNC_READ = 1, 2, 3, 4, 5, 6, 8, 0x83, 0x82
+FAST_SYNC_READ, BULK_READ = 0x8A, 0x92
 
 
 @dataclass(frozen=True)

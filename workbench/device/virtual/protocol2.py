@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from workbench.device.virtual.protocol import PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Instruction
+from workbench.device.virtual.protocol import FAST_SYNC_READ, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Instruction
 
 HEADER = b"\xff\xff\xfd\x00"
 STATUS = 0x55
@@ -46,6 +46,12 @@ class Protocol2:
         number = next((n for bit, n in _NUMBERS.items() if error & bit), 0)
         return packet(servo, STATUS, bytes([number | (ALERT if error & _STATE else 0)]) + parameters)
 
+    def block(self, so_far: bytes, servo: int, error: int, parameters: bytes) -> bytes:
+        """A servo's part of the single packet that answers a Fast Sync Read. so_far: the packet up to there."""
+        number = next((n for bit, n in _NUMBERS.items() if error & bit), 0)
+        body = bytes([number | (ALERT if error & _STATE else 0), servo]) + parameters
+        return body + crc16(so_far + body).to_bytes(2, "little")
+
     def identity(self, model: int, firmware: int) -> bytes:
         """The answer to a ping."""
         return model.to_bytes(2, "little") + bytes([firmware])
@@ -80,7 +86,7 @@ def crc16(data: bytes) -> int:
 
 def _narrow(instruction: int, parameters: bytes) -> bytes:
     """Parameters with addresses and lengths of one byte, as the servo's conduct has them."""
-    if instruction in (READ, SYNC_WRITE, SYNC_READ) and len(parameters) >= 4:
+    if instruction in (READ, SYNC_WRITE, SYNC_READ, FAST_SYNC_READ) and len(parameters) >= 4:
         return bytes([parameters[0], parameters[2]]) + parameters[4:]
     if instruction == WRITE and len(parameters) >= 2:
         return parameters[:1] + parameters[2:]

@@ -44,7 +44,7 @@ class VirtualProfile:
     registers: by these names the servo's conduct finds them: model_number, id, baud_rate, return_delay_time, status_return_level,
     cw_angle_limit, ccw_angle_limit, temperature_limit, min_voltage_limit, max_voltage_limit, max_torque, alarm_shutdown, lock,
     torque_enable, goal_position, moving_speed, torque_limit, present_position, present_speed, present_load, present_voltage,
-    present_temperature, registered, moving, cw_compliance_margin, cw_compliance_slope, punch; what a family lacks is left out.
+    present_temperature, registered, moving, cw_compliance_margin, cw_compliance_slope, punch; a family has only some of them.
     bit_rate: value of the baud-rate register to bit/s. answer_times: of ping, read, and write with its time for each byte.
     interrupt: the motor interrupt's period and length, in which nothing is sent. refresh: how seldom speed and load are new.
     eeprom_time: for each byte written, in which the servo is deaf. speed_sign, load_sign: bit of the sign, 0 for two's

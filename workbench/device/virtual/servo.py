@@ -20,6 +20,7 @@ from workbench.device.virtual.protocol import (
     WRITE,
     Instruction,
 )
+from workbench.device.virtual.protocol2 import Protocol2
 from workbench.device.virtual.registers import Register, VirtualProfile
 
 VOLTAGE, ANGLE, HEAT, RANGE, CHECKSUM, OVERLOAD, UNKNOWN = (1 << k for k in range(7))
@@ -165,6 +166,24 @@ class VirtualServo:
         self.alarms()
         self._refresh(time)
         return self._answer(time, 0, bytes(self._table[address:address + count]), self.profile.answer_times[1], level=1)
+
+    def add_block(self, what: bytes, time: int, head: bytes, so_far: bytes) -> tuple[int, bytes] | None:
+        """This servo's part of the one packet that answers a Fast Sync Read for `what`, address and count, when it is its turn:
+        when its last byte is out [ticks], and the part without the head, which the first servo sends. None where it says
+        nothing."""
+        address, count = what
+        protocol = self.profile.protocol
+        able = self.powered and not self.mute and time >= self._deaf_until and address + count <= self.profile.size
+        if not able or not isinstance(protocol, Protocol2):
+            return None
+        self._heard = time
+        alarms = self.alarms()
+        self._refresh(time)
+        block = protocol.block(head + so_far, self.ident, alarms, bytes(self._table[address:address + count]))
+        data = block if so_far else head + block
+        delay = self["return_delay_time"] * self.profile.return_delay_unit if not so_far else 0.0
+        first = time + round((delay + self.profile.answer_times[1] * (not so_far) + self._rng.uniform(0, 2e-6)) * SECOND)
+        return self.bus.talk(self, data, self.rate, self._starts(first, len(data))), block
 
     def _write(self, packet: Instruction, time: int) -> None:
         error, ready = RANGE, time

@@ -21,7 +21,7 @@ class ZeroOffset(Effect):
     parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE, seldom_beyond=15.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} stands {spec.parameters['angle']:.1f} deg off its servo's zero."
+        return f"{', '.join(spec.where)} is {spec.parameters['angle']:.1f} deg off its servo's zero."
 
     def zero(self, values: Mapping[str, float]) -> float:
         return values["angle"]

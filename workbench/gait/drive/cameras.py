@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.metrics import heading
@@ -14,8 +13,8 @@ from workbench.files import InputError
 from workbench.gait.drive.walk import Cameras, Seen, captured, lies
 from workbench.robot import RobotModel
 from workbench.simulation.virtual_robot import VirtualRobot
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 STALE = 0.1
 """A pose older than this [s] is none: at 30 frames a second, the slowest cameras', three were lost."""
 _FROM_Y_UP = Rotation.from_matrix([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.device.tables.limits import check_limits
 from workbench.files import InputError
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.files.reading import read_text, write_whole
@@ -25,10 +24,9 @@ from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_ma
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Array, Progress
 
 FILE = "family.json"
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)
@@ -36,10 +34,11 @@ class FamilyOptions:
     """How a family is certified.
 
     most: largest turn [rad per stance]; most_change: from one cycle to the next [rad]; both as `DriveOptions` has them. draws:
-    robots; of 20 that stand, fewer than 14 % fall (at 95 %). cycles: of each robot's walk, with turns at random. hold: cycles for
-    which a turn is kept. least_gain: smallest gain of any robot, as a share of the nominal one; with less the plan's turns do not
-    bring the robot back within its horizon. most_gain: largest gain, as a share; at twice the nominal one the loop with its two
-    cycles of delay begins to oscillate. authority: heading change at the largest turn, in scatters of one cycle's heading.
+    robots; of 20 that stand, fewer than 14 % fall (at 95 %). cycles: of each robot's walk, with turns at random. hold: cycles
+    for which a turn is kept. least_gain: smallest gain of any robot, as a share of the nominal one; with less the plan's turns
+    do not bring the robot back within its horizon. most_gain: largest gain, as a share; at twice the nominal one the loop with
+    its two cycles of delay begins to oscillate. authority: heading change at the largest turn, in scatters of one cycle's
+    heading. grid: turns over the range whose tables are checked against the limits of servos and joints.
     """
 
     most: float = 0.15
@@ -50,10 +49,11 @@ class FamilyOptions:
     least_gain: float = 0.5
     most_gain: float = 2.0
     authority: float = 3.0
+    grid: int = 13
     time_step: float = 1e-3
 
     def __post_init__(self) -> None:
-        check_whole(self, draws=1, cycles=8, hold=1)
+        check_whole(self, draws=1, cycles=8, hold=1, grid=3)
         check_positive(self, "most", "most_change", "least_gain", "most_gain", "authority", "time_step")
 
 
@@ -122,8 +122,17 @@ def certify_family(family: GaitFamily, gait_sha256: str, ensemble: Ensemble, fol
     maps = [fitted(*rows_of(t, turns, family), o.most) for t in takes if not fell(t)]
     falls = len(takes) - len(maps)
     draws = {"count": len(takes), "falls": falls, "falls at most": bound(falls, len(takes)), **_spread(maps, family.period)}
-    problems = _problems(nominal, maps, falls, o)
+    problems = (*broken_limits(family, o), *_problems(nominal, maps, falls, o))
     return FamilyCertificate(o.most, o.most_change, nominal, draws, gait_sha256, model.sha256, problems)
+
+
+def broken_limits(family: GaitFamily, o: FamilyOptions) -> list[str]:
+    """Limits of servos and joints that tables break at turns over the whole range, in words; those of the first such turn."""
+    for turn in np.linspace(-o.most, o.most, o.grid):
+        broken = [v for v in check_limits(family.cycle(turn), family.machine.model) if not v.warning]
+        if broken:
+            return [f"turn {turn:+.3f}: {broken[0]}"]
+    return []
 
 
 def bounded_turns(rng: np.random.Generator, o: FamilyOptions) -> Array:

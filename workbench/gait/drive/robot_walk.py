@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.device.bus.errors import BusError
@@ -22,8 +21,7 @@ from workbench.gait.drive.family import GaitFamily
 from workbench.gait.drive.walk import Seen, StoppedError
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 class PoseSource(Protocol):

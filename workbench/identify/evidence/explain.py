@@ -21,10 +21,10 @@ from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
-from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, with_fits, without_names
+from workbench.identify.evidence.search import Found, continue_search, lockstep, with_best, with_fits, without_names
 from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
-from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
+from workbench.identify.evidence.unknown_law import carried_on, on_windows, slopes_by_law, with_unknown_law
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
@@ -60,15 +60,15 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
         left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
         found = tuple(left.get(k, f) for k, f in enumerate(found))
-        rollouts, found = gone_on(rollouts, found, options, progress)
+        rollouts, found = continue_search(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
     names: dict[int, list[Fitted]] = {}
     if options.most:
         progress("names that are tied", None)
-        names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+        names = lockstep(with_best(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
         found = tuple(with_fits(f, names[k], options) for k, f in enumerate(found))
         progress("an unnamed torque", None)
-        rollouts, found = _beside_unnamed(standing(rollouts, found), found, options)
+        rollouts, found = _beside_unnamed(with_best(rollouts, found), found, options)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
@@ -76,13 +76,13 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=whole, regions=entire, errors=step_errors(whole, entire))
     last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
-    fine = standing(fine, found)
+    fine = with_best(fine, found)
     everywhere = Whole(fine, (), options)
-    together = everywhere.fitted(everywhere.begun([f.best for f in found]))
+    together = everywhere.fitted(everywhere.start([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
-    return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
+    return Explanation(nominal, replace(with_best(rollouts, found), shared=together.shared), found, believed, robot,
                        tuple(rejected), options, problem.played.missed, drifting, stopped,
                        tuple(names.get(k, []) for k in range(len(found))))
 
@@ -102,17 +102,19 @@ def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Can
 
 
 def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was found in each joint, with models that have an unnamed torque there."""
-    parts = {}
-    for k, f in enumerate(found):
-        (joint,) = f.region.joints
-        law = torque_law(joint, rollouts.evaluator.evidence, rollouts.nominal, options.law)
-        if law is not None:
-            full = rollouts.nominal.servo(joint).torque_at_full_duty
-            parts[k] = with_unknown_law(f, options, law, full)
-    done = lockstep(rollouts, parts)
+    """The models of each joint, with those that have an unnamed torque there: found on windows, judged as the others are."""
+    laws = {k: torque_law(f.region.joints[0], rollouts.evaluator.evidence, rollouts.nominal, options.law)
+            for k, f in enumerate(found)}
+    seen, known = rollouts, dict(enumerate(found))
+    if rollouts.horizon > options.horizon:
+        seen = rollouts.around_here(rollouts.step, options.horizon)
+        known = lockstep(seen, {k: on_windows(f, options) for k, f in known.items() if laws[k] is not None})
+    done = lockstep(seen, {k: with_unknown_law(f, options, law) for k, f in known.items()
+                           if (law := laws[k]) is not None})
+    if seen is not rollouts:
+        done = lockstep(rollouts, {k: carried_on(found[k], f, options) for k, f in done.items()})
     found = tuple(done.get(k, f) for k, f in enumerate(found))
-    return standing(rollouts, found), found
+    return with_best(rollouts, found), found
 
 
 def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
@@ -147,7 +149,7 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
     fit = yield from regressed(region, options, fit)
-    fit = replace(fit, beside=(yield from slopes_by_law(fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit = replace(fit, beside=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

@@ -17,13 +17,13 @@ from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turne
 from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
-from workbench.identify.evidence.tied_names import gravity_over_torque
+from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
-from workbench.identify.results.unknown_torque import UnknownTorque, said
+from workbench.identify.results.unknown_torque import UnknownTorque, list_arguments
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
@@ -94,7 +94,7 @@ class Explanation:
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The likeliest model's effects, the surest first."""
-        out = self._of_robot(evidence, before, after)
+        out, ties = self._of_robot(evidence, before, after), {t.where: t for t in self.tied}
         for region, p in zip(self.rollouts.regions, self.posteriors):
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
             for (c, x), s in zip(h.sizes(), h.slices()):
@@ -110,12 +110,13 @@ class Explanation:
                 others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
                 where = (*c.where, *(place for _, places in elsewhere for place in places))
                 fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
-                out.append(Finding(
+                finding = Finding(
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
                     estimates(c, x, covariance[s, s] if tie is None else tie.covariance(covariance[s, s], x)), fit, validation,
                     tuple(others[:1]),
                     c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
-                    family=None if family is None else FamilyBelief(family, share * p.families[family])))
+                    family=None if family is None else FamilyBelief(family, share * p.families[family]))
+                out.append(shared_by_tie(finding, ties.get(region.joints), self.options))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
     def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:
@@ -123,7 +124,7 @@ class Explanation:
         depends_on, probability = p.unnamed_instead((c.name, c.where))
         if probability < CONCLUSIONS.worth_an_experiment:
             return ""
-        return f" Or ({probability:.2f}) a torque that depends on {said(depends_on)}, which no known effect describes."
+        return f" Or ({probability:.2f}) a torque that depends on {list_arguments(depends_on)}, which no known effect describes."
 
     def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
         """Torques of the likeliest model that no effect describes, by joint."""

@@ -24,8 +24,8 @@ Asks = Generator[list[Hypothesis], list[Array], T]
 
 @dataclass(frozen=True)
 class Fitted:
-    """r (n,): what it leaves [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of which
-    effects there are; too_much (k, k): information that J seems to hold and that is only noise of J, where that is known."""
+    """r (n,): residuals [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of the set of
+    effects; too_much (k, k): apparent information in J that is only noise of J, where that is known."""
 
     hypothesis: Hypothesis
     r: Array = field(repr=False)
@@ -88,8 +88,8 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
 
 def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
             J: Array | None = None) -> Asks[Fitted]:
-    """Fits a hypothesis from where it stands, at a discrepancy s. r, J: what it leaves there and how that answers to theta, where
-    known; else they are asked."""
+    """Fits a hypothesis from its current parameters, at a discrepancy s. r, J: residuals there and their derivatives by theta, if
+    known; else they are requested."""
     prior, seen = Prior.of(start, options), dict[bytes, Array]()
     low, high = start.bounds()
     start = start.at(np.clip(start.theta, low, high))
@@ -119,18 +119,18 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit gone on with at its own discrepancy, with slopes measured anew."""
+    """A fit continued at its own discrepancy, with new slopes."""
     return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
 
 
 def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit with slopes J by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of a
-    Hadamard matrix, so that all moves tell each number (R. Plackett and J. Burman, Biometrika 33, 1946).
+    """A fit with slopes J by regression on simultaneous moves of all parameters, in both directions, as far as `options.spread`:
+    signs of a Hadamard matrix, so that every move informs every parameter (R. Plackett and J. Burman, Biometrika 33, 1946).
 
-    A joint that sticks answers a small move by chance, which differences of one number after the other take for slopes, and
-    their square for information: two numbers that do the same would seem to be told apart, and both to be well known. What the
-    moves leave unexplained says how much of it is chance, which is taken off (W. Fuller, Measurement error models, 1987).
-    An effect that adds to a number of the law which is recalibrated as well (dry friction) answers as that does: the recording
+    The response of a sticking joint to a small move is random; one-at-a-time differences take it for slopes, and its square for
+    information: two parameters with the same effect would seem to be separable, and both well known. The residuals of the
+    regression estimate the random part, which is subtracted (W. Fuller, Measurement error models, 1987).
+    An effect that adds to a constant of the law which is recalibrated as well (dry friction) has the same response: the recording
     shows their sum alone.
     """
     h, k = f.hypothesis, len(f.hypothesis.theta)
@@ -150,7 +150,7 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
 
 
 def _of_rank_one(J: Array, precision: Array) -> Array:
-    """Slopes (n, 2) of two numbers that act alike: the nearest ones that are multiples of each other."""
+    """Slopes (n, 2) of two parameters with the same response: the nearest ones that are multiples of each other."""
     along = np.linalg.svd(np.sqrt(precision)[:, None] * J, full_matrices=False)[2][0]
     return np.asarray(np.outer(J @ along, along))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -145,20 +146,8 @@ class Prior:
 
     @classmethod
     def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
-        n = len(h.numbers)
-        center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
-        freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
-        for c in h.effects:
-            low, high = c.bounds()
-            shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
-            told = np.isfinite(seldom)
-            center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
-            width = np.where(told, seldom / furthest, 1.0 if c.read_off else options.width)
-            scale.append(np.where(shapes, options.doublings, width))
-            freedom.append(np.where(told, options.freedom, 1.0))
-            normal.append(shapes)
-            one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
-        return cls(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))
+        """Of a hypothesis, whatever its sizes; the same object for the same numbers and effects."""
+        return _prior(len(h.numbers), h.effects, options)
 
     def rows(self, theta: Array) -> Array:
         """Numbers of which half the squares are the log prior but for a constant."""
@@ -195,3 +184,20 @@ def log_odds(names: int, expected: float) -> float:
 def start(numbers: Sequence[Uncertain]) -> Hypothesis:
     """The nominal law as it stands."""
     return Hypothesis(tuple(numbers), (), np.zeros(len(numbers)))
+
+
+@lru_cache(maxsize=1024)
+def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> Prior:
+    center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
+    freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
+    for c in effects:
+        low, high = c.bounds()
+        shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
+        told = np.isfinite(seldom)
+        center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
+        width = np.where(told, seldom / furthest, 1.0 if c.read_off else options.width)
+        scale.append(np.where(shapes, options.doublings, width))
+        freedom.append(np.where(told, options.freedom, 1.0))
+        normal.append(shapes)
+        one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
+    return Prior(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))

@@ -84,7 +84,7 @@ def _describe(event: _Event) -> str:
     elif event.simulated < STANDS <= event.speed:
         what = f"moves through {angle:.0f} deg{duty}, where the model sticks"
     elif event.speed < STANDS:
-        what = f"stands elsewhere, at {angle:.0f} deg{duty}"
+        what = f"rests elsewhere, at {angle:.0f} deg{duty}"
     else:
         what = f"moves otherwise about {angle:.0f} deg{duty}"
     return f"worst from {event.begin:.1f} s, {error:.1f} deg: {what}"

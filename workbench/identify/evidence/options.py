@@ -36,7 +36,9 @@ class LawOptions:
     friction and motor do smoothly. knots: rows of a table for each function. covered: quantiles of the motion between which
     functions lie. slow [rad/s]: below it speeds are covered evenly, above it by their logarithm. least_travel [rad]: of a joint
     that could show such a torque. iterations: of a fit; shares_of_step: of its steps that are tried. behind [nats]: a law
-    predicted this far behind the likeliest model is not fitted. reweighted: rounds in which Student's weights settle.
+    predicted this far behind the likeliest model is not fitted. reweighted: rounds in which Student's
+    weights settle. probe: change of a weight that tells its slope, as a share of the torque at full duty: above what dry friction
+    holds at a joint that is nearly at rest, which would answer smaller ones with nothing.
     """
 
     shares: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1)
@@ -51,6 +53,7 @@ class LawOptions:
     shares_of_step: tuple[float, ...] = (1.0, 0.5, 0.2)
     behind: float = 7.0
     reweighted: int = 3
+    probe: float = 0.02
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,15 @@ from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.linearise import linearised
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
-from workbench.identify.evidence.search import Found, begun, gone_on, lockstep, search, searched, standing
+from workbench.identify.evidence.search import (
+    Found,
+    complete_search,
+    continue_search,
+    lockstep,
+    recalibrate_nominal,
+    search,
+    with_best,
+)
 from workbench.identify.parameters import Candidate, Key
 from workbench.types import Progress
 
@@ -48,19 +56,19 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
     for in addition to the joints' effects."""
     if not names:
         whole, found = search(rollouts, options, report)
-        return RobotFound(whole, found, Whole(whole, (), options).begun([f.best for f in found]))
-    start, found = begun(rollouts, options, report)
+        return RobotFound(whole, found, Whole(whole, (), options).start([f.best for f in found]))
+    start, found = recalibrate_nominal(rollouts, options, report)
     first = _first(start, found, names, options, report)
     at = _to_the_end(*first, names, rollouts.step, options, report)
     if not at.together.shared.effects:
         return at
     if first[0].shared.effects:
         report("the same without effects of the whole robot", None)
-        alone, alone_found = searched(start, found, rollouts.step, options, report, at.rollouts.horizon)
+        alone, alone_found = complete_search(start, found, rollouts.step, options, report, at.rollouts.horizon)
     else:
-        alone, alone_found = gone_on(replace(at.rollouts, shared=start.shared), at.found, options, report)
+        alone, alone_found = continue_search(replace(at.rollouts, shared=start.shared), at.found, options, report)
     of_alone = Whole(alone, (), options)
-    together = of_alone.fitted(of_alone.begun([f.best for f in alone_found]))
+    together = of_alone.fitted(of_alone.start([f.best for f in alone_found]))
     return _weighed(at, RobotFound(alone, alone_found, together), names, options)
 
 
@@ -69,7 +77,7 @@ def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate
     """The first fits, with an effect of the whole robot where that comes first."""
     report("effects of the whole robot", None)
     whole = Whole(rollouts, tuple(names), options)
-    alone = whole.begun([f.best for f in found])
+    alone = whole.start([f.best for f in found])
     moves = lockstep(rollouts, {k: linearised(f.region, options, f.best) for k, f in enumerate(found)})
     by_joints = sum(max(0.0, moves[k][0].gain) if moves[k] else 0.0 for k in range(len(found)))
     added = whole.predicted(alone)
@@ -82,11 +90,11 @@ def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate
 def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], step: float, options: EvidenceOptions,
                 report: Progress) -> RobotFound:
     """Joints searched, and effects of the whole robot added as long as they pay."""
-    rollouts, found = searched(rollouts, found, step, options, report)
+    rollouts, found = complete_search(rollouts, found, step, options, report)
     for _ in range(NUMERICS.rounds):
         report("effects of the whole robot", None)
         whole = Whole(rollouts, tuple(names), options)
-        now = whole.fitted(whole.begun([f.best for f in found]))
+        now = whole.fitted(whole.start([f.best for f in found]))
         rollouts, found = _beside(rollouts, found, now)
         more = whole.predicted(now)
         added = [whole.fitted(more)] if more is not None and more.log_posterior > now.log_posterior else []
@@ -95,9 +103,9 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
         if best is now or len(best.shared.effects) > NUMERICS.rounds or rollouts.exhausted:
             rivals = {c.key: (t.shared.effects[-1], t.log_posterior - now.log_posterior) for c, t in swaps}
             return RobotFound(rollouts, tuple(found), now, rivals=rivals)
-        rollouts, found = gone_on(*_beside(rollouts, found, best), options, report)
+        rollouts, found = continue_search(*_beside(rollouts, found, best), options, report)
     whole = Whole(rollouts, tuple(names), options)
-    return RobotFound(rollouts, tuple(found), whole.fitted(whole.begun([f.best for f in found])))
+    return RobotFound(rollouts, tuple(found), whole.fitted(whole.start([f.best for f in found])))
 
 
 def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Candidate, Together]]:
@@ -107,7 +115,7 @@ def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Ca
     for k, f in enumerate(found):
         for c in f.best.hypothesis.effects:
             bare = f.fits.get(f.best.hypothesis.without(lambda other, c=c: other is c).key)
-            more = None if bare is None else whole.predicted(whole.begun([*now.fits[:k], bare, *now.fits[k + 1:]]))
+            more = None if bare is None else whole.predicted(whole.start([*now.fits[:k], bare, *now.fits[k + 1:]]))
             out += [] if more is None else [(c, whole.fitted(more))]
     return out
 
@@ -116,7 +124,7 @@ def _beside(rollouts: Rollouts, found: Sequence[Found], at: Together) -> tuple[R
     """State with shared effects and the fits of the regions."""
     states = tuple(replace(f, fits={**(f.fits if f.fits and fit.hypothesis.key == f.best.hypothesis.key else {}),
                                     fit.hypothesis.key: fit}) for f, fit in zip(found, at.fits))
-    return standing(replace(rollouts, shared=at.shared), states), states
+    return with_best(replace(rollouts, shared=at.shared), states), states
 
 
 def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], options: EvidenceOptions) -> RobotFound:

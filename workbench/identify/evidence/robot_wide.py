@@ -63,7 +63,7 @@ class Whole:
         """Of the robot."""
         return self.rollouts.regions
 
-    def begun(self, fits: Sequence[Fitted]) -> Together:
+    def start(self, fits: Sequence[Fitted]) -> Together:
         """Regions with shared effects whose slopes are not known yet."""
         shared = self.rollouts.shared
         return self.judged(shared, fits, [np.zeros((len(f.r), len(shared.theta))) for f in fits])

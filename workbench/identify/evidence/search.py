@@ -27,7 +27,7 @@ Key = frozenset[Term]
 
 @dataclass(frozen=True)
 class Found:
-    """What the search of one region fitted, by which effects there are, and which of these were extended by all others."""
+    """Fits of one region, by their set of effects, and which of these were extended by every other effect."""
 
     region: Region
     fits: Mapping[Key, Fitted]
@@ -44,32 +44,32 @@ class Found:
         return best.key not in self.extended and len(best.effects) < options.most
 
     def beam(self, options: EvidenceOptions) -> list[Fitted]:
-        """The likeliest fits, few enough to go on with."""
+        """The most probable fits, few enough to continue with."""
         return sorted(self.fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
 
 
 def search(rollouts: Rollouts, options: EvidenceOptions, report: Progress) -> tuple[Rollouts, tuple[Found, ...]]:
-    """Searches all regions side by side, level by level; returns them with what stands in each."""
-    return searched(*begun(rollouts, options, report), rollouts.step, options, report)
+    """Searches all regions in lockstep, level by level; returns them with the best fits of each."""
+    return complete_search(*recalibrate_nominal(rollouts, options, report), rollouts.step, options, report)
 
 
-def begun(rollouts: Rollouts, options: EvidenceOptions, report: Progress) -> tuple[Rollouts, tuple[Found, ...]]:
+def recalibrate_nominal(rollouts: Rollouts, options: EvidenceOptions, report: Progress) -> tuple[Rollouts, tuple[Found, ...]]:
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
     rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
     first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
     found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
-    return standing(rollouts, found), found
+    return with_best(rollouts, found), found
 
 
-def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Progress,
-             horizon: float | None = None) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was begun searched to its end. step, horizon [s]: of rollouts by which it is judged; None: `_judging_horizon`.
+def complete_search(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Progress,
+                    horizon: float | None = None) -> tuple[Rollouts, tuple[Found, ...]]:
+    """Continues to the end of the search. step, horizon [s]: of rollouts by which it is judged; None: `_judging_horizon`.
 
-    How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
-    something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
-    longer than `options.explored` and at a coarse step, and then judges what it fitted, and goes on, by what the closest fits
-    leave. It explores in windows, and judges by whole logs only where these tell as much (`_judging_horizon`).
+    Only the closest model reveals the correlation time of the errors, since the residuals of a poorer one are correlated by its
+    missing effects (Mallows' Cp takes the noise from the largest model for the same reason). So the search explores first, as if
+    the time were at most `options.explored` and at a coarse step, and then judges its fits, and continues, by the residuals of
+    the closest fits. It explores in windows, and judges by whole logs only where these are as informative (`_judging_horizon`).
     """
     rollouts, states = _all_levels(rollouts.around_here(PROBLEM.coarse, options.horizon), list(found), options, True, report)
     here = rollouts.around_here(step, _judging_horizon(rollouts, states, options) if horizon is None else horizon)
@@ -78,9 +78,9 @@ def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: E
 
 
 def _judging_horizon(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> float:
-    """By which horizon models are judged [s]: that of windows, or infinity, whole logs. What a right model leaves grows little
-    over a log, and then the whole log tells most, as no window starts from a noisy state; where stick and slip decide what is
-    left after seconds, it grows by several times, and is luck (`options.grown`)."""
+    """Horizon by which models are judged [s]: that of windows, or infinity for whole logs. The residuals of a correct model grow
+    little over a log, and then the whole log is most informative, as no window starts from a noisy state; where stick and slip
+    dominate the residuals after seconds, they grow by several times, at random (`options.grown`)."""
     if not np.isfinite(options.horizon):
         return options.horizon
     whole = rollouts.around_here(rollouts.step, np.inf)
@@ -89,10 +89,10 @@ def _judging_horizon(rollouts: Rollouts, found: Sequence[Found], options: Eviden
     return np.inf if np.mean(grown) < np.log(options.grown) else options.horizon
 
 
-def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Progress
-            ) -> tuple[Rollouts, tuple[Found, ...]]:
-    """The search gone on with from what was found, as after names were taken out."""
-    rollouts, on = _all_levels(standing(rollouts, found), list(found), options, False, report)
+def continue_search(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Progress
+                    ) -> tuple[Rollouts, tuple[Found, ...]]:
+    """Continues the search from these fits, for instance after names were removed."""
+    rollouts, on = _all_levels(with_best(rollouts, found), list(found), options, False, report)
     return rollouts, tuple(on)
 
 
@@ -104,7 +104,7 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
     def everywhere(part: Callable[[Found], Asks[Found]], these: Collection[int]) -> None:
         nonlocal rollouts, found
         found = _replaced(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
-        rollouts = standing(rollouts, found)
+        rollouts = with_best(rollouts, found)
 
     everywhere(lambda f: _renewed(f, options, exploring, True), range(len(found)))
     if not exploring:
@@ -147,8 +147,8 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """Where the best fit cannot be extended to a better one: without each of its effects in turn, fitted from where it stands, as
-    what an earlier fit of the smaller model missed is no reason for an effect; and with others in its place."""
+    """If the best fit cannot be extended to a better one: drops each of its effects in turn, fitted from the current parameters,
+    so that a poorly converged smaller model does not justify an extra effect; and exchanges each for others."""
     if found.best.hypothesis.key not in found.extended:
         return found
     best, region = found.best, found.region
@@ -163,20 +163,38 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     """Some states extended, each by so many of the moves that predict most; those are fitted, and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
+    published: dict[Key, Move] = {}
     for f in states:
         alone = yield from linearised(region, options, f)
+        if not f.hypothesis.effects:
+            published = {m.hypothesis.key: m for m in (yield from _from_published(region, options, f))}
+            least = dict.fromkeys((m.hypothesis.key for m in alone), -np.inf) | {key: m.gain for key, m in published.items()}
+            alone = sorted((replace(m, gain=max(m.gain, least[m.hypothesis.key])) for m in alone), key=lambda m: -m.gain)
         alone, both = ([m for m in each if m.hypothesis.key not in fits]
                        for each in (alone, best_of_each(in_pairs(region, options, f, alone))))
         moves += [(f, m) for m in to_be_fitted(alone, both, options)[:refined]]
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
+    made = yield from side_by_side([_moved(region, options, f, m, published.get(key)) for key, (f, m) in wanted.items()])
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
     fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
+
+
+def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+    """Every effect alone, predicted around the nominal law as it stands; gains compared with a plain fit f. A plain fit adjusts
+    the law for want of the effect, and predicts its size badly."""
+    h = start(region.numbers)
+    if not len(h.theta):
+        return []
+    steps = np.where(h.theta + options.stride <= h.bounds()[1], options.stride, -options.stride)
+    r, *moved = yield [h, *(h.at(h.theta + by) for by in np.diag(steps))]
+    there = judged(region, options, h, r, np.column_stack([(m - r) / by for m, by in zip(moved, steps)]))
+    moves = yield from linearised(region, options, there)
+    return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 
 
 def _with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
@@ -197,20 +215,21 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more with the nominal law as it
-    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move, published: Move | None = None) -> Asks[Fitted]:
+    """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more from the nominal law as it
+    stands, with the size that it predicts (published), as a law recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis
     fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
                                     fitting(region, options, _as_published(h), f.discrepancy, options.iterations, None,
-                                            None if shaped else m.J)])
+                                            None if shaped else m.J) if published is None else
+                                    fitting(region, options, published.hypothesis, f.discrepancy, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
 def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: bool) -> Asks[Found]:
-    """The fits judged anew by the correlation time of what the closest of them leave: the median of a few, as one tells it
-    badly. again: rolled out again, as other regions stand elsewhere now, or the step is another."""
+    """The fits judged by the correlation time of the closest residuals: the median of a few, as a single estimate is poor.
+    again: rolled out again, because other regions have changed, or the step has."""
     near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
     left = [f.r for f in near]
     if again:
@@ -223,8 +242,8 @@ def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: boo
 
 
 def _refitted(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """The likeliest fits gone on with, and made once more with the nominal law as it stands, as they are of a coarser step and of
-    another correlation time: by how far each is off by now, one name would win over another that does as well."""
+    """The most probable fits continued, and repeated from the nominal law, at the finer step and the new correlation time:
+    otherwise fits that have not converged there would be compared with fits that have."""
     region, least = found.region, found.best.log_posterior - 3 * options.occam
     near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if f.log_posterior > least][:options.refined]
     made = yield from side_by_side([
@@ -245,7 +264,7 @@ def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) ->
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
-    """What generators of several regions return; their rollouts are shared."""
+    """Results of generators of several regions, whose rollouts are shared."""
     return together(dict(parts), lambda wanted: rollouts.answers([(i, h) for i, h in wanted]))
 
 
@@ -255,8 +274,8 @@ def _all_of(rollouts: Rollouts, parts: Sequence[Generator[Any, Any, Any]]) -> li
 
 
 def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candidate]) -> Asks[Found]:
-    """Without all fits that have one of these effects, which are not to be looked at again; the best of them is fitted anew from
-    where it stands without them, as there may be no other fit."""
+    """Without all fits that have one of these effects, which are not to be tried again; the best of them is fitted without these
+    effects from its current parameters, as there may be no other fit."""
     names, best = {c.key for c in gone}, found.best
     h, J = without(best, lambda c: c.key in names)
     fit = yield from fitting(found.region, options, h, best.discrepancy, options.iterations, None, J)
@@ -265,8 +284,8 @@ def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candi
     return replace(found, region=region, fits=_with_better(fits, [fit]))
 
 
-def standing(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
-    """With the best of what was found standing in each region."""
+def with_best(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
+    """With the best fit of each region as the hypothesis used for it."""
     return replace(rollouts, regions=tuple(f.region for f in found), standing=tuple(f.best.hypothesis for f in found))
 
 

@@ -19,7 +19,7 @@ from workbench.identify.evidence.posterior import RegionPosterior
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque
 from workbench.identify.options import CONCLUSIONS
-from workbench.identify.results.findings import Estimate
+from workbench.identify.results.findings import Alternative, Estimate, Finding
 from workbench.identify.results.tied_names import GravityOverTorque, TiedName
 
 SCALE = "torque_at_full_duty"
@@ -76,6 +76,17 @@ def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[li
     fits = yield from side_by_side([polished(told, options, g) for g in fits])
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
     return sorted(within, key=lambda g: -g.log_evidence)
+
+
+def shared_by_tie(f: Finding, told: GravityOverTorque | None, options: EvidenceOptions) -> Finding:
+    """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with the tie's
+    probability shared among all of them."""
+    near = [] if told is None else [n for n in told.names if n.behind < options.occam]
+    others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
+    if told is None or not others or len(others) == len(near):
+        return f
+    each = min(f.confidence, told.confidence / len(near))
+    return replace(f, confidence=each, alternatives=(Alternative(others[0].effect, others[0].where, each),))
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:

@@ -40,13 +40,15 @@ class Functions:
 @dataclass(frozen=True)
 class TorqueLaw:
     """An unnamed torque at one joint. weights (M,) [N m]: one for each function, 0 in absent groups; scales [N m]:
-    standard deviation of the weights of each group present; tried: how many scales were tried for each."""
+    standard deviation of the weights of each group present; tried: number of scales tried for
+    each; full_torque [N m]: of the servo at full duty."""
 
     joint: str
     functions: tuple[Functions, ...]
     weights: Array = field(repr=False)
     scales: Mapping[str, float] = field(default_factory=dict)
     tried: int = 1
+    full_torque: float = 1.0
 
     @cached_property
     def group_of(self) -> tuple[str, ...]:
@@ -139,7 +141,8 @@ def torque_law(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel, 
         _radial("duty and direction", "duty", np.concatenate([duty, -duty]), options.of_duty, options),
         _radial("duty and direction", "duty and direction", np.abs(duty), options.of_duty, options),
         _stretched(_radial("speed", "speed", np.arcsinh(np.degrees(speed) / slow), options.of_speed, options), slow))
-    return TorqueLaw(joint, functions, np.zeros(sum(f.values.shape[1] for f in functions)), tried=len(options.shares))
+    return TorqueLaw(joint, functions, np.zeros(sum(f.values.shape[1] for f in functions)), tried=len(options.shares),
+                     full_torque=model.servo(joint).torque_at_full_duty)
 
 
 def _stretched(f: Functions, slow: float) -> Functions:

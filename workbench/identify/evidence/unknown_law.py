@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, without
-from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, start
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, Term, log_odds, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.torque_law import TorqueLaw
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 Scales = Mapping[str, float]
+Key = frozenset[Term]
 
 
 @dataclass(frozen=True)
@@ -47,17 +48,17 @@ class _State:
 
 @dataclass(frozen=True)
 class _Predicted:
-    """Where linear algebra leads from a state. log_posterior [nats]."""
+    """Where linear algebra leads from a state. r (n,): predicted residuals; log_posterior [nats]."""
 
     h: Hypothesis
+    r: Array = field(repr=False)
     log_posterior: float
 
 
-def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw, full_torque: float) -> Asks[Found]:
+def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw) -> Asks[Found]:
     """The models of a region, with those that have an unnamed torque, unless none is predicted to be competitive.
-    law: of weight 0; full_torque [N m]: of the joint's servo."""
+    law: of weight 0."""
     region, best = found.region, found.best
-    scales = tuple(share * full_torque for share in options.law.shares)
     bases = [best]
     if best.hypothesis.effects:
         bare = yield from fitting(region, options, start(region.numbers), best.discrepancy, options.iterations)
@@ -65,63 +66,105 @@ def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw, ful
     states = []
     for f in bases:
         h = replace(f.hypothesis, law=law)
-        B = yield from _by_weights(h, f.r, scales[0], np.ones(len(law.weights), dtype=bool))
+        B = yield from _by_weights(h, f.r, options.law.probe * law.full_torque, np.ones(len(law.weights), dtype=bool))
         states.append(_State(h, f.r, f.J, B))
-    predicted = [_predicted(region, options, at, scales) for at in states]
-    if max(p.log_posterior for p in predicted) < best.log_posterior - options.law.behind:
+    # the correlation time of the residuals of the most flexible law, as Mallows' Cp takes the noise from the largest model
+    flexible = dict.fromkeys(law.groups, max(options.law.shares) * law.full_torque)
+    closest = min(region.correlation(_solved(region, options, at, flexible).r) for at in states)
+    shorter = region.correlated(min(region.likelihood.tau, closest))
+    least = judged(shorter, options, best.hypothesis, best.r, best.J).log_posterior
+    predicted = [_predicted(shorter, options, at).log_posterior for at in states]
+    if max(predicted) < least - options.law.behind:
         return found
     made: list[Fitted] = []
-    for at, p in zip(states, predicted):
-        if p.log_posterior > best.log_posterior - 3 * options.law.behind:
-            made += yield from _followed(region, options, at, scales)
-    fits = dict(found.fits)
-    for f in made:
+    for at, nats in zip(states, predicted):
+        if nats > least - 3 * options.law.behind:
+            made += yield from _followed(shorter, options, at)
+    return _with(found, made, options)
+
+
+def on_windows(found: Found, options: EvidenceOptions) -> Asks[Found]:
+    """The most probable model of a region alone, judged by rollouts over windows, to which residuals of a law respond linearly;
+    over whole logs they hardly do."""
+    best = found.best
+    (r,) = yield [best.hypothesis]
+    region = found.region.correlated(min(options.explored, found.region.correlation(r)))
+    J = yield from _by_theta(options, best.hypothesis, r)
+    fit = judged(region, options, best.hypothesis, r, J)
+    return replace(found, region=region, fits={fit.hypothesis.key: fit})
+
+
+def carried_on(found: Found, windows: Found, options: EvidenceOptions) -> Asks[Found]:
+    """A region's models with the likeliest ones that have an unnamed torque on windows, fitted from there to whole logs."""
+    ahead = sorted((f for f in windows.fits.values() if f.hypothesis.law is not None), key=lambda f: -f.log_posterior)
+    made = []
+    for f in ahead[:options.beam]:
+        (r,) = yield [f.hypothesis]
+        nothing = np.zeros((len(r), len(f.hypothesis.law.weights)))  # type: ignore[union-attr]
+        at = yield from _measured(options, _State(f.hypothesis, r, nothing[:, :0], nothing))
+        region = found.region.correlated(min(found.region.likelihood.tau, found.region.correlation(r)))
+        at = yield from _fitted(region, options, at, options.law.iterations)
+        made.append(_as_fit(region, options, at))
+    return _with(found, made, options)
+
+
+def _with(found: Found, made: Sequence[Fitted], options: EvidenceOptions) -> Found:
+    """With these fits, all judged by the correlation time of the closest ones' residuals; of each set of effects and groups the
+    likelier fit."""
+    every = [*found.fits.values(), *made]
+    closest = sorted(every, key=lambda f: f.discrepancy)[:options.beam]
+    alike = [f.r for f in closest if f.discrepancy < options.grown * closest[0].discrepancy]
+    region = found.region.correlated(float(np.median([found.region.correlation(r) for r in alike])))
+    fits: dict[Key, Fitted] = {}
+    for f in (judged(region, options, f.hypothesis, f.r, f.J, f.beside) for f in every):
         fits[f.hypothesis.key] = max(f, fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
-    return replace(found, fits=fits)
+    return replace(found, region=region, fits=fits)
 
 
-def _followed(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float]) -> Asks[list[Fitted]]:
+def _followed(region: Region, options: EvidenceOptions, at: _State) -> Asks[list[Fitted]]:
     """A state fitted, then without each of its effects in turn as long as that is likelier: a name that the law makes needless
     was none."""
     made: list[Fitted] = []
-    at = yield from _fitted(region, options, at, scales, options.law.iterations)
+    at = yield from _fitted(region, options, at, options.law.iterations)
     now = _as_fit(region, options, at)
     made.append(now)
     while at.h.effects:
-        fewer = yield from side_by_side([_without(region, options, at, c, scales) for c in at.h.effects])
+        fewer = yield from side_by_side([_without(region, options, at, c) for c in at.h.effects])
         fits = [_as_fit(region, options, other) for other in fewer]
         made += fits
         k = int(np.argmax([f.log_posterior for f in fits]))
         if fits[k].log_posterior < now.log_posterior - options.law.behind:
             break
-        at = yield from _fitted(region, options, fewer[k], scales, 1)
+        at = yield from _fitted(region, options, fewer[k], 1)
         now = _as_fit(region, options, at)
         made.append(now)
     return made
 
 
-def _without(region: Region, options: EvidenceOptions, at: _State, gone: Candidate, scales: Sequence[float]) -> Asks[_State]:
+def _without(region: Region, options: EvidenceOptions, at: _State, gone: Candidate) -> Asks[_State]:
     """A state without one of its effects, the rest led after that with the slopes that are known."""
     h, J = without(_as_fit(region, options, at), lambda c: c is gone)
     (r,) = yield [h]
-    return (yield from _stepped(region, options, _State(h, r, J, at.B), scales, 2))
+    return (yield from _stepped(region, options, _State(h, r, J, at.B), 2))
 
 
-def _fitted(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float], iterations: int) -> Asks[_State]:
+def _fitted(region: Region, options: EvidenceOptions, at: _State, iterations: int) -> Asks[_State]:
     """Gauss and Newton's steps; after each the slopes are measured again."""
     for _ in range(iterations):
         before = at
-        at = yield from _stepped(region, options, at, scales, 1)
-        at = yield from _measured(options, at, scales[0])
+        at = yield from _stepped(region, options, at, 1)
+        at = yield from _measured(options, at)
+        if before.law.scales and _as_fit(region, options, at).log_posterior < _as_fit(region, options, before).log_posterior:
+            return before
         if np.array_equal(at.h.theta, before.h.theta) and np.array_equal(at.law.weights, before.law.weights):
             break
     return at
 
 
-def _stepped(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float], steps: int) -> Asks[_State]:
+def _stepped(region: Region, options: EvidenceOptions, at: _State, steps: int) -> Asks[_State]:
     """Steps to where linear algebra leads, as far as rollouts agree, with the slopes that are known."""
     for _ in range(steps):
-        p = _predicted(region, options, at, scales)
+        p = _predicted(region, options, at)
         assert p.h.law is not None
         here = at.h.at(at.h.theta)
         here = replace(here, law=at.law.at(at.law.weights, p.h.law.scales))
@@ -151,19 +194,24 @@ def _objective(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array
     return region.likelihood.log(r, s) + Prior.of(h, options).log(h.theta) + h.law.log_prior
 
 
-def _measured(options: EvidenceOptions, at: _State, weight: float) -> Asks[_State]:
+def _measured(options: EvidenceOptions, at: _State) -> Asks[_State]:
     """A state with its slopes measured there, those of weights that are not there left as they are."""
-    low, high = at.h.bounds()
-    theta, k = at.h.theta, len(at.h.theta)
-    steps = np.where(theta + options.stride <= high, options.stride, -options.stride)
-    steps = np.where(theta + steps < low, 0.5 * (high - low), steps)
-    moved = [at.h.at(theta + steps[i] * np.eye(k)[i]) for i in range(k)]
-    left = (yield moved) if moved else []
-    J = np.column_stack([(r - at.r) / step for r, step in zip(left, steps)]) if k else np.empty((len(at.r), 0))
+    J = yield from _by_theta(options, at.h, at.r)
     B = at.B.copy()
     active = at.law.active
-    B[:, active] = (yield from _by_weights(at.h, at.r, weight, active))[:, active]
+    B[:, active] = (yield from _by_weights(at.h, at.r, options.law.probe * at.law.full_torque, active))[:, active]
     return _State(at.h, at.r, J, B)
+
+
+def _by_theta(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:
+    """Slopes (n, k) of r by theta, from differences."""
+    low, high = h.bounds()
+    theta, k = h.theta, len(h.theta)
+    steps = np.where(theta + options.stride <= high, options.stride, -options.stride)
+    steps = np.where(theta + steps < low, 0.5 * (high - low), steps)
+    moved = [h.at(theta + steps[i] * np.eye(k)[i]) for i in range(k)]
+    left = (yield moved) if moved else []
+    return np.column_stack([(other - r) / step for other, step in zip(left, steps)]) if k else np.empty((len(r), 0))
 
 
 def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]) -> Asks[Array]:
@@ -177,12 +225,12 @@ def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]
     return B
 
 
-def slopes_by_law(f: Fitted) -> Asks[Array | None]:
+def slopes_by_law(options: EvidenceOptions, f: Fitted) -> Asks[Array | None]:
     """Slopes (n, m) of a fit's residuals by the weights of its unnamed torque; None without one."""
     law = f.hypothesis.law
     if law is None:
         return None
-    B = yield from _by_weights(f.hypothesis, f.r, min(law.scales.values()), law.active)
+    B = yield from _by_weights(f.hypothesis, f.r, options.law.probe * law.full_torque, law.active)
     return np.asarray(B[:, law.active])
 
 
@@ -190,10 +238,11 @@ def _as_fit(region: Region, options: EvidenceOptions, at: _State) -> Fitted:
     return judged(region, options, at.h, at.r, at.J, at.B[:, at.law.active])
 
 
-def _predicted(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float]) -> _Predicted:
+def _predicted(region: Region, options: EvidenceOptions, at: _State) -> _Predicted:
     """The most probable groups (at least one) and scales of a law together with a state's effects, by linear algebra. Groups are
     added one by one while that pays, each at its best scale given the others."""
     best, chosen = _solved(region, options, at, {}), dict[str, float]()
+    scales = [share * at.law.full_torque for share in options.law.shares]
     first: _Predicted | None = None
     while True:
         tries = [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s})
@@ -240,4 +289,4 @@ def _solved(region: Region, options: EvidenceOptions, at: _State, scales: Scales
     evidence = likelihood.log(r, s) + prior.log(x[:k]) + law.log_prior + 0.5 * len(x) * np.log(2 * np.pi)
     parts = len(h.effects) + sum(len(c.options) for c in h.effects) + len(scales)
     price = parts * log_odds(len(region.candidates), options.expected)
-    return _Predicted(h, float(evidence - 0.5 * np.linalg.slogdet(H)[1] + price))
+    return _Predicted(h, r, float(evidence - 0.5 * np.linalg.slogdet(H)[1] + price))

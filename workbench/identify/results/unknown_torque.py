@@ -37,7 +37,7 @@ class UnknownTorque:
     @property
     def evidence(self) -> str:
         """For a person."""
-        return f"{self.joint} has a torque of {1e3 * self.rms:.2g} mN m RMS that depends on {said(self.depends_on)}, " \
+        return f"{self.joint} has a torque of {1e3 * self.rms:.2g} mN m RMS that depends on {list_arguments(self.depends_on)}, " \
                "which no known effect describes."
 
     def to_json(self) -> dict[str, Any]:
@@ -47,6 +47,6 @@ class UnknownTorque:
                 "tables": tables, "fit": self.fit.to_json(), "validation": self.validation.to_json(), "evidence": self.evidence}
 
 
-def said(names: Sequence[str]) -> str:
+def list_arguments(names: Sequence[str]) -> str:
     """The arguments of a torque in a sentence: "angle, and on duty and direction"."""
     return ", and on ".join(names)

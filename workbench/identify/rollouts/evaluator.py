@@ -254,7 +254,7 @@ class RolloutEvaluator:
         if self.evidence[take].take.spec.base != "fixed":
             return model
         felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
-        return model if len(felt) == len(model.effects) else replace(model, effects=felt)
+        return model if len(felt) == len(model.effects) else model.with_effects(felt)
 
     def _key(self, felt: RobotModel, take: int, q: RolloutRequest) -> str:
         if take not in self._take_keys:

@@ -14,7 +14,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
-from workbench.identify.selection.record import SelectionStep, before_rough, taken
+from workbench.identify.selection.record import SelectionStep, accepted_effects, before_rough
 from workbench.identify.selection.scheduling import standing_out
 from workbench.types import Array
 
@@ -78,13 +78,13 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
             left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not floating:
         return left < ACCEPTANCE.all_closed * FIT.least_gain
-    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
+    brought = sum(t.gain["choose"] for t in accepted_effects(rounds) if t.joint is None and not search.is_settled(t.candidate))
     return left < max(ACCEPTANCE.least_walking, ACCEPTANCE.left_share * brought)
 
 
 def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
     """Those in which something was taken that fixed-base takes identified."""
-    return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
+    return [r for r in rounds if any(search.is_settled(t.candidate) for t in accepted_effects([r]))]
 
 
 def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds: Sequence[SelectionStep], current: Fit) -> bool:
@@ -98,7 +98,7 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     if not floating:
         return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, ACCEPTANCE.least_share)) > least
-    floating_terms = [(r, a) for r in rounds for a in taken([r])
+    floating_terms = [(r, a) for r in rounds for a in accepted_effects([r])
               if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate)]
     brought = sum(a.gain["choose"] for _, a in floating_terms)
     settled = _settling(search, rounds)

@@ -29,7 +29,7 @@ from workbench.identify.selection.options import ACCEPTANCE, FORWARD, SCHEDULING
 from workbench.identify.selection.pair_move import with_pair
 from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
 from workbench.identify.selection.reevaluation import reevaluated
-from workbench.identify.selection.scheduling import asked, standing_out
+from workbench.identify.selection.scheduling import groups_to_try, standing_out
 from workbench.identify.selection.screening import tried
 from workbench.identify.selection.swap import best_sets
 from workbench.types import Progress
@@ -95,7 +95,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             stopped = search.evaluator.work > most_work
             if stopped:
                 break
-            groups, on = asked(search, likely, current, beyond, takes, tier)
+            groups, on = groups_to_try(search, likely, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += tried(search, current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])

@@ -16,7 +16,7 @@ from workbench.identify.selection.acceptance import explained_at_the_end
 from workbench.identify.selection.odds import chi_squared_lead, dispersion, is_by_floating_base, is_equivalent, is_outpriced
 from workbench.identify.selection.options import COMPARISON, RIVAL
 from workbench.identify.selection.record import SelectionResult
-from workbench.identify.selection.rivals import TakenIn, put_in_place, rivals_near
+from workbench.identify.selection.rivals import TakenIn, replace_effect, rivals_near
 from workbench.types import Array, Progress
 
 
@@ -46,7 +46,7 @@ def compare_models(search: Search, chosen: SelectionResult, report: Progress) ->
     taken_in: TakenIn = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
     for turn in range(len(fit.effects) + 1):
         near = [rivals_near(search, taken_in, fit.effects, c, x) for c, x in fit.sizes()]
-        put = iter(search.side_by_side([put_in_place(search, fit, i, t) for i, there in enumerate(near) for t in there],
+        put = iter(search.side_by_side([replace_effect(search, fit, i, t) for i, there in enumerate(near) for t in there],
                                        partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
         rivals = [[next(put) for _ in there] for there in near]
         challengers = [(chi_squared_lead(search, fit, r, taken) / dispersion(search, fit, c, taken), r, c)

@@ -43,7 +43,7 @@ class SelectionResult:
         return any(r.stopped for r in self.rounds)
 
 
-def taken(rounds: Sequence[SelectionStep]) -> list[CandidateFit]:
+def accepted_effects(rounds: Sequence[SelectionStep]) -> list[CandidateFit]:
     """The accepted physical effects."""
     return [t for r in rounds for t in r.accepted if not _exact(t)]
 

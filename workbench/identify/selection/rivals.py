@@ -50,7 +50,7 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
     return not c.shapes.any() or bool(np.any(c.shapes & ((x < low + RIVAL.shape_end) | (x > high - RIVAL.shape_end))))
 
 
-def put_in_place(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
+def replace_effect(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
     """The fit with a rival in place of effect i and its parameters fitted, together with those of others in its joint where
     fixed-base takes identify them; the same effect elsewhere starts from the size of the other, and a rival from the equivalent
     values, if that is better."""

@@ -16,7 +16,7 @@ from workbench.identify.proposals import heavy_links
 from workbench.identify.selection.options import SCHEDULING
 
 
-def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
+def groups_to_try(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
             tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
     """Groups to try, and the takes for each: effects of joints at the joints with a gap, on a fixed base all joints at once,
     since on the ground one bad joint moves all; others one by one. tier: likely effects come first, to limit the work."""

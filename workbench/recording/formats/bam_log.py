@@ -57,11 +57,11 @@ def read_bam_log(path: str | Path) -> Recording:
         load = _column(source, entries, "load", False)
         load = np.where(load > 32767, load - 65536, load)
         if not np.any(load):
-            problems.append("load is 0 in every row: it was not read, so that there is no duty")
+            problems.append("load is 0 in every row: it was not read, so duty is unknown")
         elif np.nanmax(np.abs(load)) <= _FULL_DUTY:
             channels[f"duty.{joint}"] = load / _FULL_DUTY
         else:
-            problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, so that there is no duty")
+            problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is not a PWM register, so duty is unknown")
     metadata = {k: str(v) for k, v in content.items() if isinstance(v, (str, int, float)) and not isinstance(v, bool)}
     notes: tuple[str, ...] = ()
     if f"duty.{joint}" not in channels and "torque" in entries[0]:

@@ -67,7 +67,7 @@ def _check_names(source: str, names: list[str], line: int) -> None:
     for i, name in enumerate(names):
         kind, dot, joint = name.partition(".")
         if name in names[:i]:
-            raise InputError(source, f"line {line}: column '{name}' stands there twice")
+            raise InputError(source, f"line {line}: column '{name}' is given twice")
         if name not in ("time", "voltage") and not (dot and joint and kind in _SCALE):
             raise InputError(source, f"line {line}: unknown column '{name[:40]}'; expected time, voltage, or one of "
                                      f"{', '.join(k + '.JOINT' for k in _SCALE)}")

@@ -62,7 +62,7 @@ def read_motive(path: str | Path) -> Recording:
             markers[name] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
     names = [a.name for a in header.assets if a.kind in _BODIES and (a.rotation or a.position)]
     for name in dict.fromkeys(n for n in names if names.count(n) > 1):
-        problems.append(f"{names.count(name)} rigid bodies are called '{name}': which is which nothing says; rename them in "
+        problems.append(f"{names.count(name)} rigid bodies are called '{name}': they cannot be told apart; rename them in "
                         f"Motive and "
                         "export again (the others are called by the name and a number)")
     metadata = dict(header.metadata)
@@ -151,7 +151,7 @@ def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], 
                         "the Time column has it")
         return frames[0] + (frames - frames[0]) // step, rate
     told = float(ticks / span)
-    problems.append(f"the header says {rate:g} frames a second, the Time column {told:.4g}; the Time column is taken")
+    problems.append(f"the header says {rate:g} frames a second, the Time column {told:.4g}; the Time column is used")
     return frames, told
 
 

@@ -25,7 +25,7 @@ def write_rosbag(recording: Recording, folder: str | Path, began: float) -> Path
     """
     folder = Path(folder)
     if folder.exists() and not (folder / "metadata.yaml").is_file():
-        raise InputError(folder, "is there already and is no bag")
+        raise InputError(folder, "already exists and is not a bag")
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:

@@ -122,7 +122,7 @@ def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, d
         raise InputError(source, f"{e}") from None
     for wanted in ("timestamp", *columns):
         if names.count(wanted) != 1:
-            raise InputError(source, f"line 1: column '{wanted}' {'stands there twice' if wanted in names else 'is missing'}")
+            raise InputError(source, f"line 1: column '{wanted}' {'is given twice' if wanted in names else 'is missing'}")
     out = {}
     for name in columns:
         try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog
-from workbench.recording.servo_log.response import fitted, shapes
+from workbench.recording.servo_log.response import fit_response, shapes
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ExchangeChecks:
 EXCHANGE = ExchangeChecks()
 
 
-def exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -> dict[str, str]:
+def find_exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -> dict[str, str]:
     """By joint, the joint whose goals its position follows instead of its own."""
     far = {j: log for j, log in logs.items() if min(np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))) >= c.goes}
     out = {}
@@ -65,6 +65,6 @@ def _explained_share(asked: JointLog, moved: JointLog, c: ExchangeChecks) -> flo
     each = max(1, len(moved.rows) // c.most)
     time, position = moved.time[::each], moved.position[::each]
     rows = np.clip(np.searchsorted(asked.time, time + 1e-9, side="right") - 1, 0, len(asked.time) - 1)
-    fit = fitted(shapes(time, asked.goal[rows]), position)
+    fit = fit_response(shapes(time, asked.goal[rows]), position)
     left = float(np.mean((position - fit.predicted) ** 2))
     return float(np.sign(fit.gain)) * max(1 - left / max(float(np.var(position)), 1e-12), 0.0)

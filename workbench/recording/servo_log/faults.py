@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.astray import without_astray
-from workbench.recording.servo_log.exchanged import exchanged
+from workbench.recording.servo_log.exchanged import find_exchanged
 from workbench.recording.servo_log.following import JointLog, joint_logs
 from workbench.recording.servo_log.held_back import held_back
 from workbench.recording.servo_log.let_go import lets_go
@@ -45,7 +45,7 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
         if (text := relative_goals(log)) is not None:
             no_goals.add(joint)
             lines.append(f"goal.{joint}: {text}; the joint's evidence is left out")
-    swapped = exchanged({j: log for j, log in logs.items() if j not in no_goals})
+    swapped = find_exchanged({j: log for j, log in logs.items() if j not in no_goals})
     no_goals |= set(swapped)
     for joint, other in swapped.items():
         back = " and the other way round" if swapped.get(other) == joint else ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog
-from workbench.recording.servo_log.response import Response, fitted, shapes
+from workbench.recording.servo_log.response import Response, fit_response, shapes
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class HeldBackChecks:
     """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves
     over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its
     extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
-    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain within `alike` of 1, to
+    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain of 1 +- `tolerance`, to
     `explained` of its variance, and with a residual of at most `share` of that distance."""
 
     goes: float = 5.0
@@ -27,7 +27,7 @@ class HeldBackChecks:
     visits: int = 3
     rows: int = 3
     off: float = 12.0
-    alike: float = 0.15
+    tolerance: float = 0.15
     explained: float = 0.95
     share: float = 0.25
 
@@ -40,14 +40,14 @@ def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
     if np.rad2deg(np.ptp(log.goal)) < c.goes:
         return
     shaped = shapes(log.time, log.goal)
-    fit = fitted(shaped, log.position)
+    fit = fit_response(shaped, log.position)
     asked, seen = np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))
     if seen < c.moves * asked and fit.explained < c.follows:
         yield (f"does not follow goal.{log.name}: it moves over {seen:.3g} deg where the goal moves over {asked:.3g} deg: torque "
                "off, a gain of 0, a servo or horn that came loose, or another joint's column?")
         return
     yield from _ends(log, fit, c)
-    if fit.explained < c.explained or abs(fit.gain - 1) > c.alike:
+    if fit.explained < c.explained or abs(fit.gain - 1) > c.tolerance:
         return
     yield from _stands_off(log, fit, c)
 
@@ -70,5 +70,5 @@ def _stands_off(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str
     away = np.rad2deg(log.position - (fit.predicted - fit.offset) / fit.gain)
     middle = float(np.median(away))
     if abs(middle) > c.off and np.rad2deg(fit.spread) < c.share * abs(middle):
-        yield (f"stands {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
+        yield (f"is {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
                "homing offset, a horn turned by a tooth)?")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog
-from workbench.recording.servo_log.response import Response, fitted, shapes
+from workbench.recording.servo_log.response import Response, fit_response, shapes
 from workbench.types import Array, Mask
 
 
@@ -49,7 +49,7 @@ def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> list[tuple[int, int]]:
     best: list[tuple[int, int]] = []
     for share in c.prefixes:
         told = log.time - log.time[0] <= share * span
-        fit = fitted(shaped, log.position, told)
+        fit = fit_response(shaped, log.position, told)
         if fit.explained < c.before or fit.gain < c.firm or not _goes_back(log.goal[told], c):
             continue
         found = [s for s in _joined(log, _stretches(log.time, log.position, fit, c), fit, c)
@@ -118,7 +118,7 @@ def _free(log: JointLog, stretch: tuple[int, int], fit: Response, c: LetGoChecks
 
 def _follows(shaped: Array, log: JointLog, rest: Mask, c: LetGoChecks) -> bool:
     """Whether outside the stretches the joint does follow its goals."""
-    fit = fitted(shaped, log.position, rest)
+    fit = fit_response(shaped, log.position, rest)
     return fit.explained >= c.before and fit.gain >= c.firm
 
 

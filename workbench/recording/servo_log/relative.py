@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog, followed
-from workbench.recording.servo_log.response import fitted, shapes
+from workbench.recording.servo_log.response import fit_response, shapes
 from workbench.types import Array
 
 
@@ -46,7 +46,7 @@ def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
     fit = followed(log.time, goal, position)
     if fit.explained > c.absolute and fit.gain < c.beyond:
         return None
-    added = fitted(shapes(log.time, np.cumsum(goal)), position)
+    added = fit_response(shapes(log.time, np.cumsum(goal)), position)
     steps = added.explained > c.added and abs(added.gain - 1) < c.alike and \
         np.mean((position - added.predicted) ** 2) < (1 - c.added) * np.var(position)
     if steps or _best(goal, position, c, summed=True):

@@ -59,7 +59,7 @@ def shapes(time: Array, goal: Array, c: ResponseChecks = RESPONSE) -> Array:
     return np.array(out)
 
 
-def fitted(shaped: Array, position: Array, told: Mask | None = None, c: ResponseChecks = RESPONSE) -> Response:
+def fit_response(shaped: Array, position: Array, told: Mask | None = None, c: ResponseChecks = RESPONSE) -> Response:
     """The best of the `shapes` (M, N) [rad] for positions (N,) [rad], fitted on the rows `told` (N,), all if left out."""
     rows = np.flatnonzero(told) if told is not None else np.arange(len(position))
     nothing = Response(np.full(len(position), float(np.mean(position[rows])) if len(rows) else 0.0), 0.0, 0.0,

@@ -126,7 +126,7 @@ def _against_goal(r: Recording, c: UnitChecks, joint: str, position: Array) -> I
                 yield f"{which}.{joint}: goes over {mine:.3g} deg where {other}.{joint} goes over {its:.3g} deg: is it in {unit}?"
                 return
     if follows < 0:
-        yield (f"position.{joint}: goes the other way than goal.{joint} (correlation {follows:.2f}): has one of them the other "
+        yield (f"position.{joint}: moves opposite to goal.{joint} (correlation {follows:.2f}): has one of them the other "
                "sign?")
     elif (away := np.rad2deg(abs(float(np.median(position - goal))))) > c.off:
         yield f"position.{joint}: stays {away:.0f} deg from goal.{joint}, which it follows: are their zeros the same?"

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog
-from workbench.recording.servo_log.response import fitted, shapes
+from workbench.recording.servo_log.response import fit_response, shapes
 from workbench.types import Array
 
 
@@ -56,7 +56,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     jumps = np.array([steps[k] - _usual(steps, k) for k in at])
     level = np.concatenate([[0.0], np.cumsum(jumps)])
     undone = log.position - np.repeat(level, np.diff(edges))
-    fit = fitted(shapes(log.time, log.goal), undone)
+    fit = fit_response(shapes(log.time, log.goal), undone)
     if fit.explained < c.explained or fit.gain <= 0:
         return none, []
     away = log.position - fit.predicted

@@ -1,4 +1,4 @@
-"""How the compiled station's functions are compiled: by numba, without the GIL, cached on disk under their sources.
+"""How the compiled station's functions are compiled: by numba, without the GIL, kept on disk under a digest of their sources.
 
 numba asks of a kept function only whether its own file has changed, not those of the functions it calls. So the folder of kept
 code is named after the content of all files that functions and constants come from.
@@ -38,7 +38,7 @@ _found = False
 
 
 def is_compiled() -> bool:
-    """Whether this version's code was compiled on this machine before: else the first run takes half a minute longer."""
+    """Whether this version's code was compiled on this machine before: else the first run takes a minute longer."""
     global _found
     _found = _found or any(cache_folder().rglob("run.run*.nbc"))
     return _found

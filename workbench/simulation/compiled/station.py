@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from workbench.effects.apply import Physics, physics_of, played
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
+from workbench.robot import puppy_model
 from workbench.simulation.compiled.arrays import Log, Schedule, State, Work, work_for
 from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.compiled.machine import Machine, machine_of
@@ -21,6 +22,7 @@ from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
 from workbench.simulation.compiled.structures import tables_of
 from workbench.simulation.compiled.tables import NotCoveredError, Tables
+from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
@@ -46,11 +48,19 @@ def run_compiled(job: Job) -> Take:
         return compiled.take()
     with _first:  # of several threads one compiles and says so, the others wait for it
         if not (is_compiled() or _ran.is_set()):
-            logging.getLogger(__name__).warning("compiling the station, once for this version and machine (half a minute) ...")
+            logging.getLogger(__name__).warning("compiling the station, once for this version and machine (a minute) ...")
         try:
             return compiled.take()
         finally:
             _ran.set()
+
+
+def compile_station() -> bool:
+    """Compiles the station unless this machine has it compiled; whether there was anything to do."""
+    if is_compiled():
+        return False
+    run_compiled(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0))
+    return True
 
 
 def _check(job: Job) -> None:

@@ -8,10 +8,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from workbench.recording.take import Take
+from workbench.robot.feet import tips
 from workbench.robot.model import RobotModel
 from workbench.types import Array
 from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
-from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
+from workbench.view.playback import Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 
 WIDEST = 2.5
@@ -34,19 +35,22 @@ def film_strip(
     if recorded is not None:
         films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
     shapes, left = robot_shapes(model), _links_on_the_left(model)
-    own, *others = (_farthest(film, shapes.feet, played) for film, *_ in reversed(films))
-    reach = max(80 * shapes.height, 2 + 100 * min(max(own, *others, 0.0), WIDEST * own))
+    ends = {model.kinematics.joint_of(link) or link: (link, tip) for link, tip in tips(model).items()} | shapes.feet
+    own, *others = (_farthest(film, ends, played) for film, *_ in reversed(films))
+    heights = [_heights(film, ends) for film, *_ in films]
+    low, high = min(h[0] for h in heights), max(h[1] for h in heights)
+    reach = max(80 * shapes.height, 60 * (high - low), 2 + 100 * min(max(own, *others, 0.0), WIDEST * own))
     figure = new_figure(12, 2.9)
     grid = figure.subplots(1, instants, sharey=True)
     for k, axes in enumerate(np.atleast_1d(grid), start=1):
         axes.axhline(0, color=COMMAND, linewidth=1.0, zorder=1)
         middle = played.base_p[k, 0]
         for film, colour, label, alpha in films:
-            _draw_sticks(axes, model, film, k, shapes.feet, left, colour, alpha)
+            _draw_sticks(axes, model, film, k, ends, left, colour, alpha)
             axes.plot([], [], color=colour, label=label)
             _say_how_far(axes, 100 * (film.base_p[k, 0] - middle), reach, colour)
         axes.set_xlim(100 * middle - reach, 100 * middle + reach)
-        axes.set_ylim(-3, 120 * shapes.height + 100 * STAND_CLEARANCE)
+        axes.set_ylim(min(-3, 100 * low - 2), 100 * high + 3)
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(f"{time[k]:.1f} s", fontsize=12)
         axes.set_xlabel("forward [cm]")
@@ -61,6 +65,13 @@ def _say_how_far(axes: Axes, off: float, reach: float, colour: str) -> None:
     if abs(off) > reach:
         x, align, said = (0.02, "left", f"\u2190 {-off:.0f} cm") if off < 0 else (0.98, "right", f"{off:.0f} cm \u2192")
         axes.text(x, 0.5, said, transform=axes.transAxes, ha=align, va="center", color=colour, fontsize=10)
+
+
+def _heights(film: Playback, ends: dict[str, tuple[str, Array]]) -> tuple[float, float]:
+    """The lowest and the highest joint or end over all frames [m]."""
+    z = [film.in_world(link)[0][:, 2] for link in film.links]
+    z += [(p + R @ tip)[:, 2] for link, tip in ends.values() for p, R in (film.in_world(link),)]
+    return float(np.nanmin(z)), float(np.nanmax(z))
 
 
 def _farthest(film: Playback, feet: dict[str, tuple[str, Array]], played: Playback) -> float:

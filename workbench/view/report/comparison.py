@@ -115,7 +115,7 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         parts.append(Details("Height and attitude of the body", [Picture(body_attitude(take.simulated, take.recorded))]))
         if recorded and simulated:
             unseen = unseen_of(take.recorded_phases, take.recorded)
-            parts.append(Picture(footfalls(simulated, recorded, span=(0.0, span[1]), unseen=unseen), "When each foot stands."))
+            parts.append(Picture(footfalls(simulated, recorded, span=(0.0, span[1]), unseen=unseen), "Stance of each foot."))
     parts.append(Replay(replay, f"{take.name} in 3D: simulated solid, recorded as a ghost.",
                         film_strip(model, take.simulated, take.recorded)))
     return Section(take.name, parts)

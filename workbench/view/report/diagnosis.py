@@ -24,6 +24,7 @@ from workbench.view.report.words import (
     capital,
     change,
     headline,
+    hidden_effects,
     in_words,
     intervals_of,
     is_error,
@@ -86,6 +87,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     """The page without its replays."""
     known = dict(diagnosis.provenance)
     seed, seconds = known.pop("seed", None), known.pop("seconds", None)
+    known.pop("cannot_show", None)  # in the summary
     more = [(k, ", ".join(f"{a} {b}" for a, b in v.items()) if isinstance(v, dict) else str(v))
             for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
     report = Report(title, headline(diagnosis), _summary(diagnosis, takes), _key_numbers(diagnosis, takes),
@@ -127,6 +129,9 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    what += [f"Log {name}: {note}." for name, notes in diagnosis.provenance.get("logs", {}).items() for note in notes
+             if "stamped" in note]
+    what += hidden_effects(diagnosis.provenance.get("cannot_show", {}))
     if why := diagnosis.provenance.get("engine", {}).get("because"):
         what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:

@@ -124,7 +124,7 @@ def _walking(take: Take, model: RobotModel, table: GaitTable, walk: tuple[Take, 
     busiest = take.joints[int(np.argmax((take.torque**2).mean(axis=0)))]
     return [
         Picture(body_path(take, others=others), "Path of the body, from above and over time."),
-        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in two seconds of walking."),
+        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "Stance of each foot, in two seconds of walking."),
         Picture(phase_portrait(busiest, take.resampled(take.time[(take.since_start > last - 2.0) & (take.since_start < last)])),
                 f"Speed over angle of {busiest}, the servo with most to do, in the same two seconds."),
         Details("Commanded and reached angles, torques, attitude", [
@@ -155,7 +155,7 @@ def _limits_section(certificate: Certificate) -> Section:
     header = ["limit", "where", "value", "limit", "unit", "left", ""]
     return Section("Limits", [
         Picture(limit_bars(certificate), "The worst joint or place of each limit; beyond one it is broken. Hatched: advice of "
-                "ROBOTIS, which is no limit of this request."),
+                "ROBOTIS, not a limit of this request."),
         Table(header, shown), Details("Every limit of every joint", [Table(header, rows)])])
 
 
@@ -199,7 +199,7 @@ def _way_section(certificate: Certificate) -> Section:
             "The robot is jerked more than by the gait itself.")
     return Section("In, out and back", [
         Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
-             "to neutral; both are in `gait.csv`, and all that is said here is of the whole. " + said),
+             "to neutral; both are in `gait.csv`, and all numbers here are of the whole motion. " + said),
         Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows),
         *_cycle_parts(certificate)])
 

@@ -160,7 +160,7 @@ def _render(part: Part) -> str:
         case Table():
             return _table(part)
         case Picture(figure, caption):
-            return f"<figure>{_image(figure, caption)}{_caption(caption)}</figure>"
+            return f"<figure><div class=wide>{_image(figure, caption)}</div>{_caption(caption)}</figure>"
         case Replay():
             return _replay(part)
         case Details(summary, parts):
@@ -179,7 +179,7 @@ def _table(table: Table) -> str:
         return f"<tr{kind}>{inside}</tr>"
 
     rows = "".join(row(cells, "td", ' class="stress"' if i in table.emphasis else "") for i, cells in enumerate(table.rows))
-    return (f"<figure class=table><table><thead>{row(table.header, 'th')}</thead><tbody>{rows}</tbody></table>"
+    return (f"<figure><div class=table><table><thead>{row(table.header, 'th')}</thead><tbody>{rows}</tbody></table></div>"
             f"{_caption(table.caption)}</figure>")
 
 

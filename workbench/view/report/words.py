@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
@@ -17,7 +17,7 @@ NAMED = 0.1
 LAYERS: dict[Layer, str] = {
     "timing": "when commands arrive", "actuator": "how servos act", "structure": "how links sit on their joints",
     "inertia": "where the mass is", "ground": "how the floor acts", "measurement": "how it was measured"}
-_BODY = {"forward": "how far the body goes", "left": "how far the body drifts to the left", "heading": "the body's heading",
+_BODY = {"forward": "how far the body moves", "left": "how far the body drifts to the left", "heading": "the body's heading",
          "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
 _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 
@@ -42,6 +42,14 @@ def headline(diagnosis: Diagnosis) -> str:
             return f"A torque at {where} that no known effect describes explains at least part of the model's error."
         case "unexplained":
             return "The recordings differ from the model, and no effect that the workbench knows explains how."
+
+
+def hidden_effects(why: Mapping[str, str]) -> list[str]:
+    """A sentence for each reason why a session's takes cannot show some effects; why: the reason, by effect and place."""
+    by_reason: dict[str, list[str]] = {}
+    for effect, reason in why.items():
+        by_reason.setdefault(reason, []).append(effect.replace("_", " "))
+    return [f"**Cannot show here**, because {reason}: {listed(effects)}." for reason, effects in by_reason.items()]
 
 
 def _with_rival(f: Finding) -> str:
@@ -151,8 +159,8 @@ def layers_of(diagnosis: Diagnosis) -> str:
         return ""
     count = {layer: sum(g.layer == layer for g in diagnosis.gap) for layer in LAYERS}
     seen = sorted((layer for layer in LAYERS if count[layer]), key=lambda layer: -count[layer])
-    said = "Sorted by where and when they show, the errors are of the kind that comes of " + listed(
-        [f"{LAYERS[layer]} ({layer}, {count[layer]} of {len(diagnosis.gap)} entries)" for layer in seen]) + "."
+    said = "By location and timing, the errors look like " + listed(
+        [f"{layer} errors ({LAYERS[layer]}: {count[layer]} of {len(diagnosis.gap)})" for layer in seen]) + "."
     causes: dict[Layer, list[str]] = {}
     for f in diagnosis.findings:
         causes.setdefault(effect_named(f.effect).layer, []).append(title_of(f.effect, f.where))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, Rgba
 from pydrake.math import RigidTransform, RollPitchYaw
 
@@ -13,17 +12,17 @@ from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc
 from workbench.gait.drive.walk import Seen
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.scene.live import open_meshcat
 from workbench.view.scene.live import show as show_model
 
-Array = NDArray[np.float64]
 PATH, PLAN, SEEN, DISC = Rgba(0.3, 0.3, 0.3), Rgba(0.85, 0.37, 0.0), Rgba(0.0, 0.45, 0.7), Rgba(0.7, 0.1, 0.1, 0.6)
 RAISED = 0.004
 """Height of lines above the floor [m], so that both are seen."""
 
 
 class DriveScene:
-    """meshcat: where to; None: a server of its own while this object lives."""
+    """meshcat: where to; None: a server of its own while this object lives. place: x, y [m], heading [rad] of the robot shown."""
 
     def __init__(self, model: RobotModel, path: WayPath, discs: Sequence[Disc] = (), meshcat: Meshcat | None = None) -> None:
         self.meshcat = show_model(model, meshcat or open_meshcat())
@@ -35,7 +34,8 @@ class DriveScene:
             self._cylinder(f"way-points/{k + 1}", point, 0.012, PATH)
         for k, disc in enumerate(discs):
             self._cylinder(f"discs/{k + 1}", np.array([disc.x, disc.y]), disc.radius, DISC)
-        self._place(np.zeros(3))
+        self.place = np.zeros(3)
+        self._move(self.place)
 
     @property
     def url(self) -> str:
@@ -46,13 +46,14 @@ class DriveScene:
         """The end of a cycle: the robot as the cameras see it, its way so far, and the planned positions (N, 2) [m]."""
         if np.isfinite(seen.captured).all():
             self._seen.append(seen.captured)
-            self._place(seen.captured)
+            self._move(seen.captured)
         if len(self._seen) > 1:
             self._line("way", np.array(self._seen)[:, :2], SEEN)
         if len(planned) > 1:
             self._line("plan", planned, PLAN)
 
-    def _place(self, pose: Array) -> None:
+    def _move(self, pose: Array) -> None:
+        self.place = pose
         x, y, heading = pose
         self.meshcat.SetTransform("/robot", RigidTransform(RollPitchYaw(0.0, 0.0, heading), [x, y, self._height]))
 

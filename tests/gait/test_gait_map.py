@@ -1,0 +1,41 @@
+"""The map of gaits: its cells, and how a gait is looked up."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from workbench.files import InputError
+from workbench.gait.ensemble import Ensemble
+from workbench.gait.gait_map import Cell, GaitMap, MapOptions, build_map
+from workbench.gait.shape import GaitShape
+from workbench.robot import puppy_model
+
+SMALL = MapOptions(cells=3, generations=1, batch=4, robots=1, fresh=1, seconds=0.5)
+
+
+def of(*cells: Cell) -> GaitMap:
+    return GaitMap(SMALL, cells, 0, "")
+
+
+def test_the_nearest_cell_is_one_that_fresh_robots_reproduced(tmp_path: Path) -> None:
+    near, far = Cell(GaitShape(), 0.1, 0.0, 0.1), Cell(GaitShape(), 0.3, 0.5, 0.1, (0.3, 0.5), True)
+    found = of(near, far)
+    assert found.nearest(0.1, 0.0) is far
+    assert (found.filled, found.reproduced) == (pytest.approx(2 / 9), 0.5)
+    assert json.loads(found.save(tmp_path / "map.json").read_text())["cells"][1]["reproduced"] is True
+    with pytest.raises(InputError, match="no gait that fresh robots reproduce"):
+        of(near).nearest(0.1, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ribs") is None, reason="needs pyribs (the extra [map])")
+def test_the_same_seed_gives_the_same_map_on_one_thread_or_two(tmp_path: Path) -> None:
+    model, frictions = puppy_model(), Ensemble(ranges={"friction": (0.5, 0.8)})
+    maps = [build_map(model, frictions, tmp_path, 3, SMALL, n_jobs) for n_jobs in (1, 2)]
+    assert maps[0] == maps[1]
+    assert maps[0].cells
+    assert all(0 <= c.speed <= SMALL.speed for c in maps[0].cells)

@@ -1,0 +1,251 @@
+"""A map of gaits over speed and turning: in each cell the gait whose motion differs least from robot to robot.
+
+Needs the extra [map] (pyribs). One generation of gaits on one robot is one joblib task: inside
+`joblib.parallel_config(backend="dask")` the tasks run on the client's cluster.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.files import InputError
+from workbench.files.option_checks import check_positive, check_whole
+from workbench.files.reading import write_whole
+from workbench.gait.certificate import CLAIM
+from workbench.gait.ensemble import Ensemble
+from workbench.gait.limits import GaitLimits, table_margins, violation
+from workbench.gait.machine import GaitMachine
+from workbench.gait.measure import measure
+from workbench.gait.request import Request
+from workbench.gait.rollouts import Rollouts
+from workbench.gait.shape import GaitShape
+from workbench.gait.space import Space, space_of
+from workbench.gait.table import GaitTable, paths_of, table_of
+from workbench.motion import Commands
+from workbench.robot import RobotModel
+from workbench.simulation import Job, SimulationConfig
+from workbench.types import Array, Progress, no_progress
+
+Task = tuple[Commands, float, float]
+"""Commands, when the first full cycle ends [s], and the period [s]."""
+Motion = tuple[float, float] | None
+"""Forward speed [m/s] and turning [rad/s]; None where the robot fell or touched the floor with something other than a foot."""
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """Size of the map and of its search.
+
+    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12
+    m/s. turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can
+    follow each other. generations, batch: of pyribs' emitter; robots: drawn ones, in addition to the nominal one, for the
+    spread. seconds: of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning
+    [m/s]. fresh: drawn robots on which each cell is tried afterwards. same: largest difference of the median there, as a share
+    of the map's range.
+    """
+
+    cells: int = 7
+    speed: float = 0.35
+    turning: float = 1.0
+    turn: float = 0.4
+    family: str = "trot"
+    knees: tuple[int, int] = (1, 1)
+    generations: int = 40
+    batch: int = 24
+    robots: int = 4
+    seconds: float = 2.0
+    spread: float = 0.1
+    fresh: int = 8
+    same: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_whole(self, cells=2, generations=1, batch=2, robots=1, fresh=1)
+        check_positive(self, "speed", "turning", "turn", "seconds", "spread", "same")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """speed [m/s], turning [rad/s]: of the nominal robot. spread: RMS difference of drawn robots from it [rad/s]. fresh: median
+    speed and turning of the fresh robots, None where one fell; reproduced: whether these are within `same`."""
+
+    shape: GaitShape
+    speed: float
+    turning: float
+    spread: float
+    fresh: tuple[float, float] | None = None
+    reproduced: bool = False
+
+
+@dataclass(frozen=True)
+class GaitMap:
+    """cells: those that were filled. rollouts: all that it took."""
+
+    options: MapOptions
+    cells: tuple[Cell, ...]
+    rollouts: int
+    model_sha256: str
+
+    @property
+    def filled(self) -> float:
+        """Share of the cells that hold a gait."""
+        return len(self.cells) / self.options.cells**2
+
+    @property
+    def reproduced(self) -> float:
+        """Share of the filled cells that fresh robots reproduce."""
+        return sum(c.reproduced for c in self.cells) / max(len(self.cells), 1)
+
+    def nearest(self, speed: float, turning: float) -> Cell:
+        """The reproduced cell nearest to a speed [m/s] and a turning [rad/s], by shares of the map's range. InputError where none
+        is."""
+        o, known = self.options, [c for c in self.cells if c.reproduced]
+        if not known:
+            raise InputError(None, "the map has no gait that fresh robots reproduce")
+        return min(known, key=lambda c: math.hypot((c.speed - speed) / o.speed, (c.turning - turning) / (2 * o.turning)))
+
+    def save(self, path: Path) -> Path:
+        """Writes it as JSON."""
+        content: dict[str, Any] = {"format": 1, "claim": CLAIM, **asdict(self), "filled": self.filled,
+                                   "reproduced": self.reproduced}
+        write_whole(path, json.dumps(content, indent=1) + "\n")
+        return path
+
+
+def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0, options: MapOptions | None = None,
+              n_jobs: int = 2, progress: Progress = no_progress) -> GaitMap:
+    """Fills the map. folder: for drawn robots' files. The same seed gives the same map, whatever `n_jobs` or the cluster is.
+    InputError where pyribs is not installed."""
+    search = _Search(GaitMachine(model), options or MapOptions(), n_jobs)
+    drawn = ensemble.draws(model, search.options.robots, seed, folder)
+    found = search.run([model, *drawn], seed, progress)
+    progress("fresh robots", None)
+    fresh = ensemble.draws(model, search.options.fresh, seed + 1, folder)
+    return GaitMap(search.options, search.tried(found, fresh), search.rollouts, model.sha256)
+
+
+class _Search:
+    def __init__(self, machine: GaitMachine, options: MapOptions, n_jobs: int) -> None:
+        self.machine, self.options, self.n_jobs, self.rollouts = machine, options, n_jobs, 0
+        space = space_of(machine, Request())
+        self.space: Space = replace(space, low=_with(space, "turn", -options.turn), high=_with(space, "turn", options.turn))
+
+    def run(self, robots: Sequence[RobotModel], seed: int, progress: Progress) -> list[Cell]:
+        """Generation by generation; the nominal robot comes first."""
+        try:
+            from ribs.archives import GridArchive
+            from ribs.emitters import IsoLineEmitter
+            from ribs.schedulers import Scheduler
+        except ModuleNotFoundError:
+            raise InputError(None, "a map of gaits needs pyribs: pip install 'drake-workbench[map]'") from None
+        o, n = self.options, len(self.space.names)
+        ranges = [(0.0, o.speed), (-o.turning, o.turning)]
+        archive = GridArchive(solution_dim=n, dims=(o.cells, o.cells), ranges=ranges, seed=seed)
+        emitter = IsoLineEmitter(archive, iso_sigma=0.05, line_sigma=0.3, initial_solutions=_first(self.space, o, seed),
+                                 bounds=[(0.0, 1.0)] * n, batch_size=o.batch, seed=seed)
+        scheduler = Scheduler(archive, [emitter])
+        for k in range(o.generations):
+            progress(f"generation {k + 1}, {len(archive)} of {o.cells**2} cells", k / o.generations)
+            points = scheduler.ask()
+            told = self.judged([self.shape(x) for x in points], robots)
+            scheduler.tell(np.array([t[0] for t in told]), np.array([t[1] for t in told]))
+        kept = archive.data(["solution", "objective", "measures"], return_type="tuple")
+        inside = [(x, s, m) for x, s, m in zip(*kept) if s > WORST / 2]
+        return [Cell(self.shape(x), float(m[0]), float(m[1]), float(-s)) for x, s, m in inside]
+
+    def shape(self, x: Array) -> GaitShape:
+        """Of a point of the unit cube."""
+        return self.space.shape(np.asarray(x, dtype=float), self.options.family, self.options.knees)
+
+    def judged(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[tuple[float, tuple[float, float]]]:
+        """Of each shape the objective, and speed and turning of the nominal robot."""
+        tables = self.tables(shapes)
+        known = [t for t in tables if t is not None]
+        motions = iter(zip(*self.played(known, robots)))
+        out = []
+        for table in tables:
+            every = next(motions) if table is not None else (None,)
+            standing = [m for m in every if m is not None]
+            if len(standing) < len(every) or table is None:
+                out.append((WORST, (0.0, 0.0)))
+                continue
+            nominal, drawn = np.array(standing[0]), np.array(standing[1:])
+            apart = (drawn - nominal) / np.array([self.options.spread, 1.0])
+            out.append((-float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))), (float(nominal[0]), float(nominal[1]))))
+        return out
+
+    def tables(self, shapes: Sequence[GaitShape]) -> list[GaitTable | None]:
+        """None for shapes beyond the legs' reach, or whose tables break a limit."""
+        limits, out = GaitLimits(), list[GaitTable | None]()
+        for paths in paths_of(self.machine, shapes):
+            try:
+                table = table_of(self.machine, paths, "map") if paths.off.max() <= limits.reach else None
+            except InputError:
+                table = None
+            good = table is not None and violation(table_margins(self.machine, table, limits)) == 0.0
+            out.append(table if good else None)
+        return out
+
+    def played(self, tables: Sequence[GaitTable], robots: Sequence[RobotModel]) -> list[list[Motion]]:
+        """Motions of every table on every robot, a task for each robot."""
+        from joblib import Parallel, delayed
+
+        tasks = []
+        for t in tables:
+            cycles = max(2, math.ceil(self.options.seconds / t.period)) + 1
+            tasks.append((t.commands(cycles), t.start_seconds + t.period, t.period))
+        self.rollouts += len(tasks) * len(robots)
+        return list(Parallel(n_jobs=self.n_jobs, prefer="threads")(delayed(walked)(robot, tasks) for robot in robots))
+
+    def tried(self, found: Sequence[Cell], fresh: Sequence[RobotModel]) -> tuple[Cell, ...]:
+        """The cells with what fresh robots did."""
+        o, tables = self.options, self.tables([c.shape for c in found])
+        motions = list(zip(*self.played([t for t in tables if t is not None], fresh)))
+        out = []
+        for cell, every in zip(found, motions):
+            if any(m is None for m in every):
+                out.append(cell)
+                continue
+            speed, turning = np.median(np.array(every), axis=0)
+            same = abs(speed - cell.speed) <= o.same * o.speed and abs(turning - cell.turning) <= o.same * 2 * o.turning
+            out.append(replace(cell, fresh=(float(speed), float(turning)), reproduced=bool(same)))
+        return tuple(out)
+
+
+WORST = -1e3
+"""Objective of a gait that falls or breaks a limit, far below any spread."""
+
+
+def walked(robot: RobotModel, tasks: Sequence[Task]) -> list[Motion]:
+    """One robot's motion under each of the commands: one task of a cluster."""
+    config = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
+    jobs = [Job(robot, config, commands, commands.end) for commands, _, _ in tasks]
+    out: list[Motion] = []
+    for take, (_, begin, period) in zip(Rollouts(n_jobs=1).takes(jobs, as_seen=False), tasks):
+        m = None if take is None else measure(take, robot, begin, period, electrical=False)
+        out.append(None if m is None or m.fell else (float(m.velocity[0]), float(m.turn_rate)))
+    return out
+
+
+def _with(space: Space, name: str, value: float) -> Array:
+    """The space's bound with another value for one name; the lower one for a negative value."""
+    edge = (space.low if value < 0 else space.high).copy()
+    edge[space.names.index(name)] = value
+    return edge
+
+
+def _first(space: Space, o: MapOptions, seed: int) -> Array:
+    """Plain gaits of the family over strides and turns, each a little different in the rest."""
+    rng, out = np.random.default_rng([seed, 7]), []
+    for stride in np.linspace(0.01, 0.08, 6):
+        for turn in np.linspace(-o.turn, o.turn, 7):
+            plain = GaitShape(o.family, o.knees, 8, float(rng.uniform(1.8, 2.6)), stride=float(stride), turn=float(turn),
+                              duty=0.6, lift=0.02, crouch=0.045, lead=1.0)
+            out.append(space.point(plain))
+    return np.array(out)
