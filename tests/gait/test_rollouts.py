@@ -5,7 +5,10 @@ import numpy as np
 from tests.simulation_compiled.test_compiled_touching import pressing
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.evaluate import SEARCH
+from workbench.gait.machine import GaitMachine
 from workbench.gait.rollouts import Rollouts
+from workbench.gait.shape import GaitShape
+from workbench.gait.table import gait_table
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 from workbench.simulation import Job
@@ -32,3 +35,15 @@ def test_a_gait_that_trips_over_itself_is_given_up_whatever_shapes_touch():
     job = pressing("fixed", duration=0.5)
     assert run_compiled(job) is not None
     assert list(Rollouts(1).takes([job])) == [None]
+
+
+def test_two_threads_give_what_one_gives():
+    """Jobs of one robot share its arrays, but no thread's scratch memory."""
+    model = puppy_model()
+    machine = GaitMachine(model)
+    tables = [gait_table(machine, GaitShape("trot", (1, 1), 8, 2.2, stride=stride, duty=0.6, lift=0.02, crouch=0.04, lead=1.0))
+              for stride in (0.03, 0.04, 0.05, 0.06)]
+    jobs = [Job(model, SEARCH, t.commands(3), t.start_seconds + 3 * t.period, 0.03) for t in tables]
+    alone, together = ([take.p_WB for take in Rollouts(n).takes(jobs)] for n in (1, 2))
+    for one, two in zip(alone, together):
+        np.testing.assert_array_equal(one, two)

@@ -76,7 +76,7 @@ def test_a_gait_that_breaks_a_limit_comes_after_all_that_keep_them(machine):
 
 
 def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(machine, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("workbench.gait.optimize.FIRST_LOOK", replace(SMALL, draws=0))
+    monkeypatch.setattr("workbench.gait.optimize.FIRST_LOOK", replace(SMALL, seeds=24, draws=0))
     monkeypatch.setattr("workbench.gait.optimize.BRIEFLY", CertifyOptions(draws=0, checked=0, seconds=1.0, floor_seconds=0.3))
     assert out_of_reach(machine, Request(speed=0.3)) is None
     assert out_of_reach(machine, Request(speed=3.0)).name == "foot speed"
@@ -85,7 +85,7 @@ def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(ma
     assert not result.met
     assert "slope, friction 0.5: 30 of 26.6 deg" in result.problem
     brief = replace(options_of(1).certify, step=2e-3, variants=("2 ms",))
-    lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6, rms=1.3, torque=2.0)  # six seeds are few
+    lax = replace(Request().limits, drift=50.0, aside=50.0, slip=5.0, lift=1e-6, rms=1.3, torque=2.0)
     result = optimize(machine, Request(speed=3.0, limits=lax), Ensemble(), OptimizeOptions(SMALL, brief, planned=False), quiet)
     assert "cannot be met by any gait: foot speed" in result.problem
     assert "the nearest table in a quick search reaches" in result.problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from copy import copy
 from dataclasses import dataclass, replace
-from threading import Event, Lock
+from threading import Event, Lock, get_ident
 
 import numpy as np
 from pydrake.math import RotationMatrix
@@ -108,7 +108,7 @@ class CompiledJob:
         self.tables: Tables = tables_of(self.model, self.physics.build, self.free)
         self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step, apart)
         self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
-        self._work: list[Work] = []  # likewise: they are not played at the same time
+        self._work: dict[int, Work] = {}  # likewise, by thread: jobs made by `of` are played at the same time
         self.plan = self._plan()
 
     def _plan(self) -> _Plan:
@@ -144,10 +144,12 @@ class CompiledJob:
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
         config, plan = self.config, self.plan
+        thread = get_ident()
+        if thread not in self._work:
+            self._work[thread] = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
+        work = self._work[thread]
         if not self._settled:
-            self._work.append(work_for(self.machine.tree, self.machine.servos, self.machine.shapes))
-            self._settled.append(self.at_rest(self._work[0]))
-        work = self._work[0]
+            self._settled.append(self.at_rest(work))
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._set_start(Start(*self.job.start), state)
