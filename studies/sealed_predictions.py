@@ -87,8 +87,8 @@ def gaits(model: RobotModel, count: int) -> dict[str, Played]:
 
 
 def went(take: Take, model: RobotModel, gait: Played) -> Went:
-    """Speed and turning over the whole cycles of a take."""
-    m = measure(take, model, gait.begin, gait.period, electrical=False)
+    """Speed and turning over the whole cycles of a take, without the first."""
+    m = measure(take, model, gait.begin + gait.period, gait.period, electrical=False)
     return Went(float(math.hypot(*m.velocity)), math.degrees(m.turn_rate), m.fell)
 
 
