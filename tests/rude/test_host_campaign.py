@@ -15,6 +15,7 @@ FOUND = [
     ("STS3215", "long stall", 544, 255),
     ("STS3215", "second program", 450, 3),
     ("XL-330", "garbled command", 5, 198),
+    ("AX-12A", "garbled command", 11, 791),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
 lost on the wire, or were sent in a bunch after a stall, and exit code 0; answers to another

@@ -67,6 +67,7 @@ class Rig:
         self._suspects: list[str] = []
         self._open: set[str] = set()
         self.repaired, self.missed = 0, 0
+        self._asked_since = self._heard_since = False
         self.readings: Counter[str] = Counter()
         self.angles: dict[str, float] = {}
 
@@ -95,6 +96,9 @@ class Rig:
         gets the slow one."""
         self.missed += len(self._open & goals.keys())
         self._open -= goals.keys()
+        if self._asked_since and not self._heard_since:  # nobody answered in the whole pose, so that nobody knows of its goals
+            self.missed += len(self._goals.keys() & goals.keys())
+        self._asked_since = self._heard_since = False
         return self._send(goals, speeds)
 
     def _send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
@@ -169,6 +173,7 @@ class Rig:
                 return
             if self._turn % turns == 0:
                 self._round_began = before
+            self._asked_since = True
             if at_once:
                 self._read_all(names)
             else:
@@ -228,6 +233,7 @@ class Rig:
     def _take(self, joint: str, values: Mapping[str, int], time: float, took: float = 0.0) -> None:
         """Judges a reading, and logs it; time: when the servo measured it [s]. took: until the answer was there [s]."""
         bus, servo = self.bus, self.ids[joint]
+        self._heard_since = True
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
         if "present_position" not in values:
             return
