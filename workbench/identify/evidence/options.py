@@ -28,17 +28,17 @@ class SinceThen:
 
 @dataclass(frozen=True)
 class LawOptions:
-    """A repeatable torque that nobody has named, beside the effects.
+    """The repeatable torque that no effect describes, which competes with the effects.
 
-    shares: standard deviations of its weights that are tried, as shares of the servo's torque at full duty: from a torque that a
-    log barely shows to one that is felt by hand, a factor of three apart, about what a log tells of such a size. of_angle,
-    of_duty, of_speed: how many functions cover what a joint did: about every 10 degrees of a usual motion, at most ten for what
-    friction and motor do smoothly. knots: rows of a table for each function. covered: quantiles of the motion between which
-    functions lie. slow [rad/s]: below it speeds are covered evenly, above it by their logarithm. least_travel [rad]: of a joint
-    that could show such a torque. iterations: of a fit; shares_of_step: of its steps that are tried. behind [nats]: a law
-    predicted this far behind the likeliest model is not fitted. reweighted: rounds in which Student's
-    weights settle. probe: change of a weight that tells its slope, as a share of the torque at full duty: above what dry friction
-    holds at a joint that is nearly at rest, which would answer smaller ones with nothing.
+    shares: standard deviations of the basis weights that are tried, as shares of the servo's torque at full duty; from barely
+    visible in a log to felt by hand, in factors of three, as finely as a log determines such a size. of_angle, of_duty,
+    of_speed: numbers of basis functions; about one for every 10 degrees of a usual motion, and at most ten where friction and
+    motor are smooth. knots: table rows for each function. covered: quantiles of the motion that the functions span. slow [rad/s]:
+    functions of speed are spaced evenly below it and by the logarithm above. least_travel [rad]: a joint that moves less cannot
+    show such a torque. iterations: of a fit; shares_of_step: fractions of its step that are tried. behind [nats]: a law predicted
+    to be this far behind the most probable model is not fitted. reweighted: rounds in which Student's weights converge. probe:
+    step of a weight for finite differences, as a share of the torque at full duty: it has to exceed the dry friction of a joint
+    near rest, which would hide the response to smaller steps.
     """
 
     shares: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1)
@@ -61,42 +61,40 @@ class EvidenceOptions:
     """Defaults hold for all robots; none was set on a session.
 
     The likelihood. tails: degrees of freedom of Student's t, so that a few events (an arm that sticks) do not decide; 4 is the
-    usual choice for robust regression (K. Lange et al., JASA 84, 1989). least_discrepancy, most_discrepancy [rad]: between them
-    its size is looked for, from a tenth of a servo's count to a lost arm.
+    usual choice for robust regression (K. Lange et al., JASA 84, 1989). least_discrepancy, most_discrepancy [rad]: bounds of the
+    model's own discrepancy, from a tenth of a servo's count to a lost arm.
 
-    The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
-    prior with heavy tails); freedom: degrees of freedom of Student's t of a size of which an effect says what one servo in a
-    hundred passes, with that as its 99 % point: 12 deg of play then cost nine nats more than 1 deg, where 4 are passed by one in
-    a hundred; sheet: standard deviation of the logarithm of torque at full duty and of back-EMF that a data sheet says: of one
-    servo that was weighed against (STS3215, 12 V) they are 2.5 and 1.9 times that; doublings: standard deviation of a number that
-    only shapes an effect, a factor of four either way. expected: effects that one joint's servo is thought to lack, spread over
-    all names that are tried; it pays for having searched many.
+    The priors. width: Cauchy scale of effect sizes, in typical sizes (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak prior
+    with heavy tails). freedom: degrees of freedom of Student's t for sizes with a known 99 % point, the value that one servo in a
+    hundred exceeds: 12 deg of play cost nine nats more than 1 deg if that point is 4 deg. sheet: standard deviation of the
+    logarithm of torque at full duty and of back-EMF from a data sheet; on one weighed servo (STS3215, 12 V) they are 2.5 and 1.9
+    times the sheet's. doublings: standard deviation, in factors of two, of a parameter that only shapes an effect. expected:
+    number of effects expected at one joint's servo, shared among all names that are tried; it corrects for searching many.
 
-    The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
-    leave is correlated for longer. horizon [s]: of the windows, each from the recorded state, by which it explores: several times
-    as long as a servo takes to a goal, short of the seconds over which stick and slip part models that are alike. grown: times
-    the discrepancy over windows up to which that over whole logs may be, for these to judge. far: standard deviations that a
-    number of the nominal law may be recalibrated by; its prior prices them. stride: of differences, in standard deviations of the
-    prior or typical sizes: stick and slip answers smaller ones with noise; spread: of the moves that tell the last slopes,
-    likewise: half of what was known before. iterations: most steps of a fit. starts: of the plain fit: through stick and slip,
-    fits of one model end up to 20 nats apart, and an effect would win for want of a better plain fit. beam: states that are
-    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are, led of these by the same
-    one; paired: of the best moves, those that are also predicted two at a time. most: effects of one joint. seconds: of all takes
-    together that the search looks at, their beginnings; the last fit sees all. most_work [s]: of a puppy's rollouts at the
-    search's step (`RolloutEvaluator.work`), after which nothing more is tried unless the search is to be thorough: about an hour
-    of a processor, several times what twelve logs of a servo need.
+    The search. explored [s]: longest correlation time used while exploring, about one stick or slip, because residuals of poor
+    models stay correlated for longer. horizon [s]: length of the windows for exploring, each from the recorded state: several
+    times a servo's settling time, but shorter than the seconds over which stick and slip separate nearly equal models. grown:
+    whole logs judge only if their discrepancy is at most this multiple of the windows'. far: largest recalibration of a number of
+    the nominal law, in standard deviations; its prior prices it. stride: step of finite differences, in prior standard deviations
+    or typical sizes; stick and slip answer smaller steps with noise. spread: the same for the simultaneous moves of the last
+    slopes, half a prior standard deviation. iterations: most steps of a fit. starts: starting points of the plain fit: through
+    stick and slip, fits of one model end up to 20 nats apart, and an effect would win only for lack of a better plain fit. beam:
+    states that are extended, and single-effect moves fitted for each; refined: fitted moves of one or two effects, led of
+    them sharing their first effect; paired: best moves that are also predicted in pairs. most: effects of one joint. seconds: of
+    all takes together that the search uses, from their beginnings; the last fit uses everything. most_work [s]: of a puppy's
+    rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one
+    processor, several times the cost of twelve servo logs.
 
-    drift: where the nominal robot is one that was diagnosed before, what may have changed since; None: it is one as drawn.
-    formal: how many times its formal standard deviations a servo's law is off: differences through stick and slip claim to know
-    more than they do, by a factor of 2 to 8 on three weighed rigs. A diagnosis writes down its law with errors so much larger.
-    law: the torque that nobody has named, beside the effects.
+    drift: how much a robot that was diagnosed before may have changed; None: the nominal robot is as designed. formal: factor on
+    the formal standard deviations of a servo's law, because differences through stick and slip understate them, by 2 to 8 on
+    three weighed rigs. law: the torque that no effect describes.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
-    less likely with it by this much, odds of twenty. alike: an effect is tied to torque if a change of all torques does at least
-    this share of the same. apart: gravity over torque is reported where it differs from the nominal by so many standard
-    deviations, its variation between days included. sure: standard errors by which a servo's own register must refute a name, and
-    refuted: the share of an effect's typical size that it then rules out, which no recording would show.
+    less likely with it by this much, odds of twenty. alike: an effect is tied to torque if scaling every torque reproduces at
+    least this share of its response. apart: gravity over torque is reported where it differs from the nominal by so many standard
+    deviations, its variation between days included. sure: standard errors by which a servo's own register must contradict an
+    effect, and refuted: the share of the effect's typical size that is then ruled out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -133,13 +131,13 @@ class EvidenceOptions:
     refuted: float = 0.3
 
     def without_names(self) -> EvidenceOptions:
-        """For servo logs without a gap: the law is calibrated, and no effect is looked for."""
+        """For servo logs without a gap: the law is calibrated, and no effect is searched for."""
         return replace(self, most=0)
 
     @classmethod
     def since(cls) -> EvidenceOptions:
-        """Of a robot that was diagnosed before: as its law is known, few models come close to the best, and a narrower search
-        finds them."""
+        """For a robot that was diagnosed before: with a known law few models come close to the best, and a narrower search finds
+        them."""
         return cls(drift=SinceThen(), beam=2, refined=4, paired=6)
 
 
@@ -147,11 +145,11 @@ class EvidenceOptions:
 class EvidenceNumerics:
     """How far the search's arithmetic is driven, which costs time and decides no name.
 
-    fine: step of the last fits, in steps of the search. rounds: most times that effects are taken out by what is plausible, by
-    what they are known to or by takes kept back, and that effects of the whole robot are looked for beside what the joints have.
-    settled: share to which a discrepancy's size is found; a hundred samples tell it to a twentieth. gain [nats]: of a step of a
-    fit of all joints below which it ends; shares: of a step that are tried. first: share of what the best effects of all joints
-    explain from which one of the whole robot goes first; which of both it is, is seen when each was searched to its end.
+    fine: step of the last fits, in steps of the search. rounds: limit of rounds in which implausible or refuted effects are
+    removed, and in which effects of the whole robot are searched alongside those of single joints. settled: relative accuracy of
+    a discrepancy's size; a hundred samples determine it to a twentieth. gain [nats]: a fit of all joints ends when a step gains
+    less; shares: fractions of a step that are tried. first: an effect of the whole robot goes first if it explains at least this
+    share of the gain of the best effects of all joints; the complete search of both decides between them.
     """
 
     fine: float = 0.5
