@@ -20,10 +20,10 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return lines[0]
 
 
-def succeeds(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """What a run that ends well prints."""
+def succeeds(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
+    """What a run that ends with this exit code prints."""
     capsys.readouterr()
-    code = main(arguments)
+    ended = main(arguments)
     captured = capsys.readouterr()
-    assert code == 0, captured.err
+    assert ended == code, captured.err
     return captured.out

@@ -105,6 +105,7 @@ def test_a_session_shows_nothing_of_what_is_hidden_and_can_be_read(trial):
     assert not any("friction" in p.read_text() for p in files if p.suffix == ".csv")
 
 
+@pytest.mark.slow
 def test_the_seed_makes_what_was_sealed_again(trial, tmp_path):
     vault = Vault(trial / "sealed")
     made = write_session(tmp_path, SessionPlan("s000", "rig", ("coulomb_friction",), False, 11))[1]

@@ -108,6 +108,7 @@ def test_bounds_are_those_of_a_binomial():
     assert bounds(5, 5)[1] == 1
 
 
+@pytest.mark.slow
 def test_predictions_close_the_gap_or_do_not(tmp_path):
     make(tmp_path, Vault(tmp_path / "sealed", seed=3), SessionPlan("s000", "rig", ("coulomb_friction",), False, 11))
     answer = Vault(tmp_path / "sealed").open("s000")

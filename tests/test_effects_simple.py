@@ -284,16 +284,16 @@ def test_what_is_not_a_servos_leaves_servos_alone(nominal):
 
 @pytest.mark.parametrize(("name", "where", "parameters", "problem"), [
     ("gearbox_gremlin", "flm", {}, "'gearbox_gremlin' is not known, or its package is not installed; known: backlash"),
-    ("coulomb_friction", "flx", {"torque": 0.1}, "where: 'flx' is no joint of this robot"),
+    ("coulomb_friction", "flx", {"torque": 0.1}, "where: the robot has no 'flx'; did you mean flt?"),
     ("coulomb_friction", (), {"torque": 0.1}, "where is empty; expected one joint"),
     ("coulomb_friction", "flm", {}, r"parameter 'torque' \[N m\] is missing"),
     ("coulomb_friction", "flm", {"torque": 0.1, "speed": 1.0}, "unknown parameter 'speed'"),
     ("coulomb_friction", "flm", {"torque": float("nan")}, "expected 0 to 1.5"),
     ("coulomb_friction", "flm", {"torque": (0.1, 0.1, 0.1)}, "'torque' is one number"),
     ("tether_force", (), {"force": 1.0}, "'force' is three numbers"),
-    ("tether_force", "body_link", {"force": (0.0, 0.0, 0.0)}, "'body_link' is no robot"),
-    ("foot_friction", "flm", {"friction": 0.5}, "'flm' is no foot"),
-    ("marker_frame", "Tail", {"rotation": (0.0, 0.0, 0.0)}, "'Tail' is no rigid_body"),
+    ("tether_force", "body_link", {"force": (0.0, 0.0, 0.0)}, "'body_link' is given, but it acts on the whole robot"),
+    ("foot_friction", "flm", {"friction": 0.5}, "'flm' is not a foot"),
+    ("marker_frame", "Tail", {"rotation": (0.0, 0.0, 0.0)}, "the robot has no 'Tail'; did you mean tail"),
 ])
 def test_bad_specs_are_named(name, where, parameters, problem):
     with pytest.raises(InputError, match=problem):

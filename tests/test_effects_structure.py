@@ -539,7 +539,7 @@ def test_backlash_explains_another_engines_recording_of_it():
 
 
 @pytest.mark.parametrize(("effect", "where", "parameters", "problem"), [
-    ("backlash", "upper", {"gap": 1.0}, "'upper' is no joint"),
+    ("backlash", "upper", {"gap": 1.0}, "'upper' is not a joint"),
     ("backlash", "a", {"gap": -1.0}, "expected 0 to 30"),
     ("joint_compliance", "a", {"stiffness": 0.0}, "expected 0.2 to"),
     ("joint_compliance", "a", {}, "'stiffness' .* is missing"),
@@ -549,10 +549,10 @@ def test_backlash_explains_another_engines_recording_of_it():
     ("joint_stop", "b", {"lower": 30.0, "upper": 40.0}, "lower below upper"),
     ("link_length", "base", {"change": 0.01}, "has no joint"),
     ("link_length", "upper", {"change": -0.15}, "cannot change by -0.15"),
-    ("link_length", "a", {"change": 0.01}, "'a' is no link"),
+    ("link_length", "a", {"change": 0.01}, "'a' is not a link"),
     ("payload", "hand", {"mass": 0.1, "position": 0.2}, "'position' is three numbers"),
     ("payload", "hand", {"mass": -0.1, "position": (0.0, 0.0, 0.0)}, "expected 0 to 5"),
-    ("com_shift", "nowhere", {"offset": (0.0, 0.0, 0.0)}, "'nowhere' is no link"),
+    ("com_shift", "nowhere", {"offset": (0.0, 0.0, 0.0)}, "the robot has no 'nowhere'"),
 ])
 def test_impossible_places_and_values_are_named(arm, effect, where, parameters, problem):
     with pytest.raises(InputError, match=problem):

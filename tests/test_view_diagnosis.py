@@ -221,7 +221,7 @@ def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeRep
     told = finding()
     page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [take], "S").html()
     assert page.count(sentence_of(told)) == 2  # in the summary and in the section
-    assert "structure, 8 of 8 entries" in page
+    assert "structure errors (how links sit on their joints: 8 of 8)" in page
     assert '<a href="next_experiment.csv">next_experiment.csv</a>' in page
     assert "whole robot" not in page
 

@@ -101,7 +101,7 @@ def test_a_played_motion_becomes_joint_states_and_a_trajectory(tmp_path):
         assert sent.angles[:, sent.joints.index(joint)].max() == pytest.approx(np.nanmax(goals))
     write_rosbag(written, folder, BEGAN)
     (tmp_path / "other").mkdir()
-    with pytest.raises(InputError, match="is there already and is no bag"):
+    with pytest.raises(InputError, match="already exists and is not a bag"):
         write_rosbag(written, tmp_path / "other", BEGAN)
 
 

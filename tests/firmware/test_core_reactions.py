@@ -30,24 +30,24 @@ class Cell:
 CELLS = {
     "silent servo": Cell(1, "ramp", SILENT, 300, True),
     "two servos with one ID": Cell(2, "ramp", GARBLED, 300, True),
-    "wrong model": Cell(3, "go on", REMOTE),
+    "wrong model": Cell(3, "continue", REMOTE),
     "overload": Cell(4, "ramp", OVERLOAD, 300, True),
     "heat": Cell(5, "ramp", HOT, 2000, True),
     "low battery": Cell(6, "ramp", LOW, 2000),
     "dead supply": Cell(7, "release", DEAD, 300),
-    "bad checksum": Cell(8, "go on", REMOTE),
+    "bad checksum": Cell(8, "continue", REMOTE),
     "babbling servo": Cell(9, "release", BABBLE, 300),
-    "cut upload": Cell(10, "go on", REMOTE),
-    "foreign upload": Cell(11, "go on", REMOTE),
-    "upload that stops": Cell(12, "go on", REMOTE),
-    "lost radio": Cell(13, "go on", REMOTE),
+    "cut upload": Cell(10, "continue", REMOTE),
+    "foreign upload": Cell(11, "continue", REMOTE),
+    "upload that stops": Cell(12, "continue", REMOTE),
+    "lost radio": Cell(13, "continue", REMOTE),
     "START held": Cell(14, "release", HELD, 1600),
-    "remote button held": Cell(15, "go on", REMOTE),
-    "PC link gone on a walk": Cell(16, "go on", REMOTE),
+    "remote button held": Cell(15, "continue", REMOTE),
+    "PC link lost on a walk": Cell(16, "continue", REMOTE),
     "PC link gone in bridge mode": Cell(17, "ramp", BRIDGE, 1300),
     "brown-out": Cell(18, "still", BROWN_OUT),
     "hang": Cell(19, "still", WATCHDOG),
-    "single odd readings": Cell(20, "go on", REMOTE),
+    "single odd readings": Cell(20, "continue", REMOTE),
 }
 
 
@@ -61,7 +61,7 @@ def check(name: str, moments: int) -> None:
         assert run.reason == row.reason, where
         if row.names:
             assert run.servo_named == run.servo_id, where
-        if row.reaction == "go on":
+        if row.reaction == "continue":
             assert (run.state, run.ramp_us, run.off_us) == (PLAY, NONE, NONE), where
             assert run.poses >= 5500 // 140, where
         elif row.reaction == "still":
@@ -87,7 +87,7 @@ def test_reaction_at_a_thousand_moments(name: str) -> None:
 
 
 def test_every_row_of_the_docs_is_a_cell_here() -> None:
-    lines = DOCS.read_text().split("| what goes wrong |")[1].split("\n\n")[0].splitlines()[2:]
+    lines = DOCS.read_text().split("| fault |")[1].split("\n\n")[0].splitlines()[2:]
     rows = {line.split("|")[1].strip(): line for line in lines}
     assert rows.keys() == CELLS.keys()
     for name, cell_ in CELLS.items():

@@ -44,7 +44,12 @@ def test_robots_by_name(name: str, joints: int) -> None:
 def test_the_fox_has_its_own_servos_and_a_robot_without_effects_is_refused_an_unknown_one(tmp_path: Path) -> None:
     fox = workbench.load_model("fox")
     assert fox.servo("LF_KFE").proportional_gain == 1.841
-    odd = workbench.save_model(fox.with_effect(workbench.EffectSpec("magic")), tmp_path / "model.yaml")
+    odd = tmp_path / "model.yaml"
+    with pytest.raises(workbench.InputError, match="effect 'magic' is not known"):
+        workbench.save_model(fox.with_effect(workbench.EffectSpec("magic")), odd)
+    assert not odd.exists()
+    pulled = fox.with_effect(workbench.EffectSpec("tether_force", (), {"force": (1.0, 0.0, 0.0)}))
+    odd.write_text(workbench.save_model(pulled, odd).read_text().replace("tether_force", "magic"))
     with pytest.raises(workbench.InputError, match=r"model\.yaml: effects: .*magic"):
         workbench.load_model(odd)
 

@@ -29,7 +29,7 @@ def test_a_users_defaults_are_taken_and_what_is_typed_wins(defaults: Path, capsy
 
 
 @pytest.mark.parametrize(("text", "problem"), [
-    ("dance: {jobs: 2}", "no verb 'dance'"), ("diagnose: {legs: 2}", "diagnose: no option --legs"),
+    ("dance: {jobs: 2}", "unknown verb 'dance'"), ("diagnose: {legs: 2}", "diagnose: no option --legs"),
     ("all: {legs: 2}", "all: no verb"),
     ("diagnose: {jobs: 0}", "diagnose: jobs: expected a whole number from 1 to"),
     ("simulate: {contact: wet}", "simulate: contact: expected one of"),

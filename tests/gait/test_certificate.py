@@ -140,7 +140,7 @@ def test_a_broken_limit_is_named(made, tmp_path):
         replace(m, use=1.5) if (m.name, m.where) == ("RMS torque", "flm") else m for m in certified.certificate.margins))
     (tmp_path / NAME).write_text(broken.as_text())
     (tmp_path / "gait.csv").write_text((folder / "gait.csv").read_text())
-    with pytest.raises(InputError, match="a limit is broken: RMS torque, flm"):
+    with pytest.raises(InputError, match="it reports a broken limit: RMS torque, flm"):
         check_certificate(tmp_path / "gait.csv", load_motion(tmp_path / "gait.csv"), machine.model)
 
 
@@ -196,7 +196,7 @@ def test_a_binary_table_is_checked_against_the_certificate_beside_it(made, tmp_p
     table = str(tmp_path / "motion.table")
     check_table_of("flash", table, machine.model, force=False)
     (tmp_path / NAME).write_text((tmp_path / NAME).read_text().replace('"seed": 7', '"seed": 8'))
-    with pytest.raises(InputError, match="was changed after it was written; --force"):
+    with pytest.raises(InputError, match="was changed after it was written; use --force"):
         check_table_of("flash", table, machine.model, force=False)
     other = load_motion(folder / "gait.csv").as_table()
     other = replace(other, dwells_ms=other.dwells_ms + 1)

@@ -133,7 +133,7 @@ def test_a_mesh_that_is_not_there_is_named_with_what_to_do(tmp_path: Path) -> No
     ('lower="-1.5"', 'lower="0.3"', "joint 'hip': zero lies outside its limits, 17.19 to 85.94 deg"),
     ('lower="-1.5" upper="1.5"', 'lower="-90" upper="90"', "are they in degrees"),
     ('<dynamics damping="0.01" friction="0.02"/>', '<mimic joint="hip"/>', "joint 'knee' mimics 'hip'"),
-    ('value="0.03"', 'value="0"', "link 'shank' weighs nothing"),
+    ('value="0.03"', 'value="0"', "link 'shank' has no mass"),
     ('ixx="4e-4" iyy="7e-4" izz="9e-4"', 'ixx="0" iyy="0" izz="0"', "link 'trunk' weighs 0.5 kg and has no rotational inertia"),
     ('lower="-2" upper="2"', 'lower="0" upper="0"', "joint 'knee': its limits are equal"),
 ])

@@ -53,17 +53,23 @@ def _unseen(row: str) -> str:
 def test_a_take_that_shows_nothing_is_refused_at_once(arm: Path, capsys: pytest.CaptureFixture[str], keep, said: str) -> None:
     path = arm / "takes" / "wave.csv"
     path.write_text("\n".join(keep(path.read_text().splitlines())) + "\n")
-    assert said in succeeds(capsys, "inspect", str(arm))
+    assert said in succeeds(capsys, "inspect", str(arm), code=2)
     assert said in refused(capsys, "compare", str(arm), "--out", str(arm / "out"), "--jobs", "1")
 
 
 @pytest.mark.parametrize(("damage", "said"), [
-    (lambda p: p.write_text("root:x:0:0\n"), "not a recording"), (lambda p: p.write_bytes(p.read_bytes()[:-3000]), "take 'wave'"),
+    (lambda p: p.write_text("root:x:0:0\n"), "not a recording"),
     (lambda p: p.write_text(""), "empty"), (lambda p: p.write_text(p.read_text().replace("Upper", "Wing")), "asset 'Wing'"),
 ])
 def test_a_recording_that_cannot_be_used_is_told(arm: Path, capsys: pytest.CaptureFixture[str], damage, said: str) -> None:
     damage(arm / "takes" / "wave.csv")
-    assert said in succeeds(capsys, "inspect", str(arm / "session.yaml"))
+    assert said in succeeds(capsys, "inspect", str(arm / "session.yaml"), code=2)
+
+
+def test_a_recording_cut_short_is_told(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = arm / "takes" / "wave.csv"
+    path.write_bytes(path.read_bytes()[:-3000])
+    assert "take 'wave'" in succeeds(capsys, "inspect", str(arm / "session.yaml"))
 
 
 def test_servos_of_some_joints_are_told(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:

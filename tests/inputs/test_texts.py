@@ -76,7 +76,7 @@ def test_poses_that_are_no_degrees_or_seconds_are_told(tmp_path: Path, capsys: p
     (tmp_path / "counts.csv").write_text("time,blb\n0,512\n1,600\n2,512\n")
     assert "counts" in succeeds(capsys, "inspect", str(tmp_path / "counts.csv"))
     (tmp_path / "ms.csv").write_text("time,blb\n0,0\n400,10\n800,0\n")
-    assert "a slip" in succeeds(capsys, "inspect", str(tmp_path / "ms.csv"))
+    assert "are the times in milliseconds?" in succeeds(capsys, "inspect", str(tmp_path / "ms.csv"))
     assert "--yes" in refused(capsys, "simulate", str(tmp_path / "ms.csv"), "--out", str(tmp_path / "out"))
     (tmp_path / "short.csv").write_text("time,blb\n0,0\n40,10\n80,0\n")  # a quick motion, over soon even in seconds
     assert "milliseconds" in refused(capsys, "simulate", str(tmp_path / "short.csv"), "--out", str(tmp_path / "out"))

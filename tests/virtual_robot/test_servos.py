@@ -105,18 +105,20 @@ def test_eeprom_writes_make_it_deaf_and_power_off_forgets_only_ram(robot):
     servos[7].power(False)
     assert handler.ping(port, 7)[1] == sdk.COMM_RX_TIMEOUT
     servos[7].power(True)
+    bus.clock.advance(bus.clock.now + SECOND)  # it boots
     assert handler.read1ByteTxRx(port, 7, 25)[0] == 0
     assert handler.read2ByteTxRx(port, 7, 6)[0] == 100
     assert handler.write2ByteTxRx(port, 7, 30, 99) == (0, 2)  # outside the angle limits
 
 
 def test_lock_keeps_the_eeprom_until_power_off(robot):
-    _bus, servos, port, handler = robot
+    bus, servos, port, handler = robot
     assert handler.write1ByteTxRx(port, 5, 47, 1) == (0, 0)
     assert handler.write1ByteTxRx(port, 5, 3, 9) == (0, 8)
     assert handler.write1ByteTxRx(port, 5, 47, 0) == (0, 8)
     servos[5].power(False)
     servos[5].power(True)
+    bus.clock.advance(bus.clock.now + SECOND)  # it boots
     assert handler.write1ByteTxRx(port, 5, 3, 99) == (0, 0)
     assert servos[5].ident == 99
 

@@ -286,4 +286,6 @@ def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     allowed = {name for place in effect.places for name in known[place]}
     for name in spec.where:
         if name not in allowed:
-            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is not a {' or '.join(effect.places)} of this robot")
+            places = [place.replace("_", " ") for place in effect.places if place != "robot"]
+            wanted = f"is not a {' or '.join(places)} of this robot" if places else "is given, but it acts on the whole robot"
+            raise InputError(None, f"effect '{spec.effect}': where: '{name}' {wanted}")
