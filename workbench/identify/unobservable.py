@@ -17,7 +17,7 @@ from workbench.robot import RobotModel
 
 HELD = "the base was held in every take"
 NO_CAMERA = "only cameras see it, and the takes are servo logs"
-NO_COMMAND = "no command of these takes brings it out"
+NO_COMMAND = "these servos and commands never bring it out"
 NO_START = "a later start looks the same, and no take says when it began"
 NO_LOAD = "gravity loads none of the joints"
 
