@@ -18,8 +18,8 @@ class TakeReport:
     recorded, nominal, fitted: the takes (SI, radians, world frame of `Take`), observed the same way, on one clock of N frames.
     channels: (c) names of joints, and for a free base of the body's coordinates. noise: (c,) standard deviation of what sensor
     noise, numerics and contact models alone cause [rad or m]. before, after: (N, c) recorded less simulated by the nominal and by
-    the fitted model, divided by `noise`; NaN where unseen or before the first command. unseen: (N,) frames that neither the
-    selection of effects nor a parameter saw. ValueError where shapes differ.
+    the fitted model, divided by `noise`; NaN where not recorded or before the first command. unseen: (N,) frames held out from
+    the choice of effects and from every fit. ValueError where shapes differ.
     """
 
     recorded: Take

@@ -27,7 +27,7 @@ _DEGREES = 180 / np.pi
 def gap_map(take: TakeReport) -> Figure:
     """Places over time: residual over noise and numerical error, RMS in cells of BIN, before and (if it differs) after.
 
-    Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks held-out frames."""
+    Pale up to LIMIT, dark at 30 times. Grey: not recorded. The line on top marks held-out frames."""
     time, edges = take.time, np.arange(0.0, max(take.time[-1], BIN) + BIN, BIN)
     rows = len(take.channels)
     figure = new_figure(12, 0.21 * rows + 1.5)
@@ -122,7 +122,7 @@ def before_after(take: TakeReport, joint: str) -> Figure:
     top.set_title(f"{take.name}: joint {joint}")
     top.set_ylabel("angle [deg]")
     strip.set_ylabel("residual [deg]")
-    strip.set_xlabel("time since the first command [s]; grey: no choice and no parameter saw it; green: noise and numerics, 2σ")
+    strip.set_xlabel("time since the first command [s]; grey: held out; green: noise and numerics, 2σ")
     strip.set_xlim(low, high)
     legend_above(top)
     return figure

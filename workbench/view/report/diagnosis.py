@@ -118,16 +118,16 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what = [*(sentence_of(f) for f in diagnosis.findings), *(u.evidence for u in diagnosis.unknown_torques)]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
-        what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that neither "
-                    "the selection of effects nor a parameter saw. **1×** is what measurement noise, numerics and the choice of "
-                    "contact model make alone.")
+        what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that "
+                    "were held out from the choice of effects and from every fit. **1×** is the error that measurement noise, "
+                    "numerics and the choice of contact model cause alone.")
     if any(c in BODY for s in takes for c in s.channels):
         what.append(
             "Walking is chaotic: for evaluation, a simulated walk is reset to the recorded base every "
             f"{PROBLEM.window:g} s; paths and 3D show it without these resets."
         )
     if seen := diagnosis.provenance.get("searched"):
-        what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
+        what.append(f"The search used the {sum(seen.values()):.0f} s of these with the largest errors ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     what += [f"Log {name}: {note}." for name, notes in diagnosis.provenance.get("logs", {}).items() for note in notes
              if "stamped" in note]
@@ -196,7 +196,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
 
 def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
-            "Green on top: stretches that no selection saw. Grey: not seen")
+            "Green on top: held-out stretches. Grey: not recorded")
     if any(c in BODY for c in take.channels):
         said += f", or the model's base had just been reset to the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
