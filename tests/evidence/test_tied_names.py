@@ -95,3 +95,12 @@ def test_names_that_fits_do_not_separate_share_the_ties_probability():
     for alone in (finding("backlash"), finding("com_shift")):
         assert shared_by_tie(alone, told, OPTIONS) == alone
     assert shared_by_tie(finding("payload"), None, OPTIONS) == finding("payload")
+
+
+def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
+    names = (TiedName("payload", ("arm",), {}, "arm carries 200 g more.", 0.0),
+             TiedName("parallel_spring", (JOINT,), {}, "A spring pulls.", 40.0))
+    tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False)
+    assert "arm carries 200 g more" in tie.said()
+    assert "spring" not in tie.said()
+    assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]

@@ -8,6 +8,10 @@ from typing import Any
 
 from workbench.identify.results.findings import Estimate
 
+COMPETITIVE = 7.0
+"""A name this far behind the best of its tie is not mentioned in the sentence [nats]: a thousand times less probable, the same
+window in which models count (`EvidenceOptions.occam`). The table lists all."""
+
 
 @dataclass(frozen=True)
 class TiedName:
@@ -44,9 +48,9 @@ class GravityOverTorque:
                f"{'that of the earlier model' if self.since else 'that of the files'}"
         each = [f"all torques of the servo times {1 / float(self.ratio.value):.2f}",  # type: ignore[arg-type]
                 *(f"{n.sentence.rstrip('.')} ({n.behind:.0f} nats behind)" if n.behind >= 1 else n.sentence.rstrip('.')
-                  for n in self.names)]
+                  for n in self.names if n.behind <= COMPETITIVE)]
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
-        return (f"{told}. Angles alone do not tell which of these it is: {'; '.join(each)}. To find out, hang a known weight on "
+        return (f"{told}. Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known weight on "
                 f"the link in some takes (`load:`){more}.")
 
     def to_json(self) -> dict[str, Any]:
