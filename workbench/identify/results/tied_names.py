@@ -50,8 +50,8 @@ class GravityOverTorque:
                 *(f"{n.sentence.rstrip('.')} ({n.behind:.0f} nats behind)" if n.behind >= 1 else n.sentence.rstrip('.')
                   for n in self.names if n.behind <= COMPETITIVE)]
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
-        return (f"{told}. Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known weight on "
-                f"the link in some takes (`load:`){more}.")
+        return (f"{told}. Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known weight "
+                f"on the link in some takes (`load:`){more}.")
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
