@@ -24,6 +24,12 @@ static void stop(struct robot *r, uint8_t reason) {
     ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
 }
 
+/* Whether a press that ends now may start something: only where it began in the same state, as a person who presses START while the
+   robot moves wants it to stop, and may let go after it has gone limp. */
+static bool began_here(const struct robot *r) {
+    return r->pressed_in == r->state || (!torque_on(r) && (r->pressed_in == STATE_STILL || r->pressed_in == STATE_LIMP));
+}
+
 /* The button acts when it is let go; held, it releases. One that was down when power came is not believed before it was up. */
 static void button(struct robot *r) {
     if (r->start_pressed != r->pressed) {
@@ -32,8 +38,9 @@ static void button(struct robot *r) {
         r->pressed_since = r->now;
         if (!r->pressed && r->armed && !r->held_told && lasted >= BUTTON_MS) {
             if (r->state == STATE_PLAY) stop(r, REASON_BUTTON);
-            else start(r, REASON_BUTTON);
+            else if (began_here(r)) start(r, REASON_BUTTON);
         }
+        r->pressed_in = (uint8_t)r->state;
         r->held_told = false;
         return;
     }

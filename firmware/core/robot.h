@@ -106,6 +106,7 @@ struct robot {
 
     uint32_t pressed_since;
     bool pressed, armed, held_told;
+    uint8_t pressed_in; /* state in which the last press began */
 };
 
 /* built_in: a whole table. cause: REASON_POWER_ON, or which reset it was. */

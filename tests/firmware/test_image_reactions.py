@@ -115,7 +115,7 @@ FAULTS: dict[str, Callable[[Robot, VirtualServo, Rng], None]] = {
     "silent servo": silent, "two servos with one ID": twin, "wrong model": model, "overload": overload, "heat": heat,
     "low battery": low, "dead supply": dead, "bad checksum": checksum, "babbling servo": babble, "cut upload": cut,
     "foreign upload": foreign, "upload that stops": stalled, "lost radio": radio, "START held": held,
-    "remote button held": remote, "PC link gone on a walk": pc, "single odd readings": odd,
+    "remote button held": remote, "PC link lost on a walk": pc, "single odd readings": odd,
 }
 
 
@@ -136,9 +136,9 @@ def meet(name: str, robot: Robot, rng: Rng) -> None:
     """One row, from now on."""
     row, at, servo = CELLS[name], robot.clock.now, robot.servos[int(rng.choice(IDS))]
     FAULTS[name](robot, servo, rng)
-    robot.run(WATCHED if row.reaction == "go on" else row.ms + 5)
+    robot.run(WATCHED if row.reaction == "continue" else row.ms + 5)
     told = told_since(robot, at)
-    if row.reaction == "go on":
+    if row.reaction == "continue":
         assert all(m.state == ControllerState.PLAY for m in told)
         assert sum(t > at for t, _ in robot.ear.poses) >= WATCHED // 140
     else:

@@ -160,10 +160,12 @@ def host_session(trouble: Trouble, folder: Path) -> str:
     sim = Sim(walk(), seed=trouble.at)
     done: list[int] = []
     plays: list[int] = []
+    asked: list[bool] = []  # whether a person wants torque: a button pressed while the robot is limp
 
     def each_ms() -> None:
         if not done and port.ms >= trouble.at:
             done.append(port.ms)
+            asked.append(trouble.kind in ("START held", "remote 1") and not any(sim.get("torque", j) for j in range(15)))
             make(trouble, sim, port)
         if sim.get("state") == 5:
             plays.append(port.ms)
@@ -188,7 +190,7 @@ def host_session(trouble: Trouble, folder: Path) -> str:
     sim.set("start", 0)
     port.run(400)
     torque = sum(sim.get("torque", j) for j in range(15))
-    if torque and "not confirmed" not in said:
+    if torque and "not confirmed" not in said and not any(asked):
         return f"said {said!r}, and {torque} servos have torque"
     if len(plays) > before and "not confirmed" not in said:
         return f"said {said!r}, and it plays on"
@@ -200,6 +202,11 @@ def host_sessions(count: int, seed: int, folder: Path) -> tuple[int, list[str]]:
     rng = random.Random(seed)
     troubles = [Trouble(KINDS[n % len(KINDS)], rng.randrange(150, 5200), rng.randrange(15)) for n in range(count)]
     return count, [f"{t}: {c}" for t in troubles if (c := host_session(t, folder))]
+
+
+@pytest.mark.parametrize("kind", ["START held", "remote 1"])
+def test_a_person_may_ask_for_torque_once_the_host_has_let_go(kind: str, tmp_path: Path) -> None:
+    assert host_session(Trouble(kind, 4900, 5), tmp_path) == ""
 
 
 def test_the_host_says_well_only_where_all_was_done_and_leaves_no_torque(tmp_path: Path) -> None:
