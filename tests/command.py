@@ -21,7 +21,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 def succeeds(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
-    """What a run that ends with this exit code prints."""
+    """Runs the command, checks its exit code, and returns its standard output."""
     capsys.readouterr()
     ended = main(arguments)
     captured = capsys.readouterr()

@@ -1,4 +1,4 @@
-"""The sessions of the trial of diagnosis: what is drawn, what is sealed, what is shown."""
+"""The sessions of the blind trial: random draws, sealed answers, published files."""
 
 import hashlib
 from collections import Counter

@@ -1,4 +1,4 @@
-"""How the trial scores a diagnosis, on findings made by hand, and beside the score of the practice sessions."""
+"""How the trial scores a diagnosis: on constructed findings, and compared with the score of the practice sessions."""
 
 import importlib.util
 import json
@@ -19,7 +19,7 @@ PLAY = ("backlash", ["flm"], {"gap": 3.0})
 
 
 def called(result):
-    """(effect, name that it was called, share of the place) of all that was hidden."""
+    """(effect, reported name, share of the place) of each hidden effect."""
     return [(e.effect, ("tie: " if e.tie else "") + e.called, e.share) for e in result.effects]
 
 

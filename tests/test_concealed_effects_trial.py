@@ -166,7 +166,7 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
 
 
 def test_a_trial_goes_on_on_another_machine_with_what_is_left_of_it(out, tmp_path):
-    """Scores come along; what is left is made anew, and has to be what was committed to."""
+    """Scores are carried over; the remaining sessions are made again, and have to match their commitments."""
     vault, carried = Vault(out / "sealed"), tmp_path / "under_way.json"
     diagnose(out, ["s000", "s001"], asker())
     part = report(out, vault)

@@ -1,4 +1,4 @@
-"""Effects on timing, servo constants, ground and forces: what each changes, at its place alone, and how effects are found."""
+"""Effects on timing, servo constants, ground and forces: each changes its own joint or link alone; and how effects are found."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_a_delay_of_one_joint_moves_its_goals_alone(commands, delay):
 
 
 def test_one_joint_may_be_later_than_all_are(commands):
-    """Instants that differ by rounding alone are one: by the delay of all, added to them, they would become equal."""
+    """Instants that differ only by rounding are one: adding the common delay would make them equal."""
     joint = 0.3 - 0.2  # another command's time, but for rounding
     both = PUPPY.with_effects((EffectSpec("command_delay", ("flm",), {"delay": joint}),
                                EffectSpec("command_delay", (), {"delay": 0.4})))
@@ -198,7 +198,7 @@ def test_ground_and_foot_friction_are_those_of_the_pair():
 
 
 def test_a_body_with_foot_friction_slides_as_that_friction_says():
-    """Standing on a slope of 15 deg: friction 0.35 of all feet holds, tan 15 deg = 0.27 > 0.2 does not."""
+    """Standing on a slope of 15 deg: friction 0.35 under every foot holds, tan 15 deg = 0.27 > 0.2 does not."""
     moved = []
     for friction in (0.35, 0.2):
         model = with_effect("ground_friction", friction=friction).with_effect(
@@ -301,7 +301,7 @@ def test_bad_specs_are_named(name, where, parameters, problem):
 
 
 def test_parameters_come_to_si():
-    """Degrees and deg/s to radians; what is SI in the contract stays."""
+    """Degrees and deg/s become radians; SI values of the contract are unchanged."""
     effects = known_effects()
     spec = EffectSpec("dead_band", ("flm",), {"margin": 9.0})
     assert si_values(effects["dead_band"], spec) == {"margin": pytest.approx(np.pi / 20)}

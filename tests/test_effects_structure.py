@@ -169,7 +169,7 @@ def test_a_loose_mount_rocks_about_its_axis_and_not_about_the_servos(rig):
 
 
 def test_stages_add_up(rig):
-    """A spring, play and a loose mount on one joint: each still gives what it gives alone."""
+    """A spring, play and a loose mount on one joint: each deflects as it does alone."""
     model = tilted(with_effects(rig, ("backlash", "j", {"gap": 3.0}), ("joint_compliance", "j", {"stiffness": 5.0}),
                                 ("loose_mount", "j", {"play": 4.0, "axis": (1.0, 0.0, 0.0)})), forward=20.0, left=20.0)
     take = at_rest(model)

@@ -249,7 +249,7 @@ def test_a_log_of_several_programmes_makes_no_take(tmp_path, model):
 
 
 def test_a_count_shows_where_values_stay_though_rows_lie_between(tmp_path, model):
-    """A log that is on a clock of its own, of a servo at rest: what a count hides is its noise."""
+    """A log with a clock of its own, of a servo at rest: the rounding to counts is its noise."""
     count = np.radians(300 / 1023)
     read = np.round(0.05 * np.sin(np.linspace(0, 12, 400)) / count) * count
     time = np.arange(0.0, 7.9, 0.02) + 0.007

@@ -1,4 +1,4 @@
-"""What a person reads where an input is of another kind, and in the tables of a report."""
+"""Messages for inputs of the wrong kind, and the text of a report's tables."""
 
 from __future__ import annotations
 

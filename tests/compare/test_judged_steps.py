@@ -1,4 +1,4 @@
-"""Where Drake has judged the compiled station on a model, finer steps and predictions are compiled, and come to the same."""
+"""Where Drake has judged the compiled station on a model, finer steps and predictions are compiled, with equal results."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def drakes(run):
 
 
 def compiled_by(run, monkeypatch, turned=0.0):
-    """The rollouts, and the steps of those that were compiled. turned [rad]: what the compiled station is wrong by."""
+    """The rollouts, and the steps of those that were compiled. turned [rad]: error given to the compiled station."""
     steps = []
 
     def counted(job):

@@ -22,8 +22,8 @@ NOISE, FRAMES = 2e-3, 400
 
 @dataclass(frozen=True)
 class Robot(Rollouts):
-    """Several joints, each a region. truth: what the nominal law leaves in each; does: by joint and name, what a unit takes
-    off."""
+    """Several joints, each a region. truth: residual of the nominal law in each; does: by joint and name, the residual that
+    a unit removes."""
 
     truth: tuple[np.ndarray, ...] = ()
     does: Mapping[tuple[int, str], np.ndarray] = field(default_factory=dict)
@@ -100,7 +100,7 @@ def test_two_effects_of_all_that_do_the_same_share_the_probability():
 
 
 def test_evidence_of_all_together_is_that_of_one_region_with_all_numbers():
-    """The Schur complement of the joints, beside the determinant of the whole information matrix."""
+    """The Schur complement of the joints, compared with the determinant of the whole information matrix."""
     rollouts, states = recalibrate_nominal(robot({}, {"supply_sag": 2.0}), OPTIONS, lambda what, share=None: None)
     whole = Whole(rollouts, tuple(candidate(n) for n in ALL), OPTIONS)
     fit = whole.fitted(whole.predicted(whole.start([f.best for f in states])))
@@ -116,7 +116,7 @@ def test_evidence_of_all_together_is_that_of_one_region_with_all_numbers():
 
 
 def test_an_effect_of_all_that_does_the_same_as_a_joints_own_is_told_beside_it():
-    """As a tilted stand and the first joint's zero: what the others feel of it is within noise."""
+    """Like a tilted stand and the first joint's zero: its effect on the other joints is within noise."""
     r = robot({(0, "backlash"): 2.0}, {})
     none = {(j, "supply_sag"): 0.0 * r.does[j, "supply_sag"] for j in (1, 2)}
     f = found(replace(r, does={**r.does, **none, (0, "supply_sag"): r.does[0, "backlash"]}))

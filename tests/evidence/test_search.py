@@ -123,7 +123,7 @@ def test_takes_kept_back_speak_against_what_only_some_show():
 
 
 def test_correlation_that_is_left_makes_frames_count_less():
-    """What a model lacks may be slow; then a minute tells little."""
+    """Missing physics may act slowly; then a minute of data determines little."""
     rollouts = robot({"backlash": 1.5})
     slow = np.convolve(np.random.default_rng(5).normal(size=len(rollouts.truth) + 199), np.ones(200) / 40, mode="valid") * 0.01
     _, quick, _ = searched(rollouts)
@@ -133,7 +133,7 @@ def test_correlation_that_is_left_makes_frames_count_less():
 
 
 def test_two_numbers_that_do_the_same_are_not_told_apart_by_sticking():
-    """Residuals that jump at each small move: differences of them would tell the two apart, moves of all at once do not."""
+    """Residuals that jump at each small move: finite differences would separate the two, simultaneous moves do not."""
     rollouts = robot({"coulomb_friction": 2.0})
     does = dict(rollouts.does)
     does[NUMBER] = 0.5 * does["coulomb_friction.torque"]

@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[2] / "docs" / "robot.md"
 
 @dataclass(frozen=True)
 class Cell:
-    """fault: number in firmware/tests/cells.h. reaction: go on, ramp, release, or still; ms: within; names: servo is named."""
+    """fault: number in firmware/tests/cells.h. reaction: continue, ramp, release, or still; ms: within; names: servo is named."""
 
     fault: int
     reaction: str

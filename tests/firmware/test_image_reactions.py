@@ -21,7 +21,7 @@ from workbench.device.virtual.protocol import packet
 pytestmark = needs_compiler
 Rng = np.random.Generator
 WATCHED = 1200
-"""How long a robot that goes on is watched [ms]: beyond two cycles, and every time-out but that of an upload."""
+"""How long a robot that continues is watched [ms]: beyond two cycles, and every time-out but that of an upload."""
 
 
 def silent(robot: Robot, servo: VirtualServo, rng: Rng) -> None:
@@ -154,7 +154,7 @@ def meet_reset(how: str, robot: Robot) -> None:
 
 
 def apart(work: Callable[[], None]) -> str:
-    """What is done to a robot in a copy of this process, so that the robot here stays as it was; the traceback of what failed."""
+    """Runs an action on the robot in a copy of this process, so that this robot is unchanged; returns the traceback, if any."""
     fork = get_context("fork")
     said = fork.SimpleQueue()
 

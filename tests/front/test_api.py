@@ -1,4 +1,4 @@
-"""`import workbench`: what it offers, and results that save and show themselves."""
+"""`import workbench`: its public names, and results that save and show themselves."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from workbench.view.scene.live import link_poses, open_meshcat, pose_by_sliders,
 
 def test_every_name_is_there_and_described() -> None:
     for name in workbench.__all__:
-        assert getattr(workbench, name).__doc__, f"workbench.{name} says nothing of itself"
+        assert getattr(workbench, name).__doc__, f"workbench.{name} has no docstring"
     assert set(workbench.__all__) <= set(dir(workbench))
     with pytest.raises(AttributeError, match="no attribute 'dance'"):
         _ = workbench.dance

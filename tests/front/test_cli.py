@@ -1,4 +1,4 @@
-"""What every verb has in common: loudness, a log beside the results, a user's defaults, completion; and the new verbs."""
+"""Common to all verbs: verbosity, the log in the output folder, a user's defaults, completion; and the new verbs."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def test_links_lead_somewhere(path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "code"), blocks("python"), ids=lambda v: v if isinstance(v, str) and len(v) < 30 else "")
 def test_python_blocks_run_as_they_stand(name: str, code: str, tmp_path: Path) -> None:
-    """Each in an empty folder that has only the data beside it."""
+    """Each in an empty folder that contains only the data."""
     (tmp_path / "data").symlink_to(ROOT / "data")
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
                           capture_output=True, text=True, timeout=300)

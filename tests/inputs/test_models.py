@@ -1,4 +1,4 @@
-"""Robots as people have them: URDF with STL meshes and ROS packages, and what no robot can be."""
+"""Robots as people have them: URDF with STL meshes and ROS packages, and impossible robots."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_a_robot_without_shapes_has_nothing_to_stand_on(tmp_path: Path) -> None:
 
 
 def test_an_impossible_inertia_is_drakes_ball_of_water(tmp_path: Path) -> None:
-    """As the message says what is used instead."""
+    """The message names the replacement."""
     path = _robot(tmp_path, ROBOT.replace('ixx="3e-5" iyy="3e-5" izz="3e-6"', 'ixx="3e-5" iyy="3e-6" izz="3e-6"', 1))
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModels(str(prepared(path).path))

@@ -1,4 +1,4 @@
-"""`inspect` of a session opens all that it names; what it tells, the verbs tell; disks that fill, and what killed runs left."""
+"""`inspect` opens every file of a session and reports what the other verbs report; full disks, and files of killed runs."""
 
 from __future__ import annotations
 

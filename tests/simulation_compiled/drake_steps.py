@@ -42,8 +42,8 @@ def config_for(base: str, step: float = 2e-3, settle: float = 0.4) -> Simulation
 
 def drake_steps(model: RobotModel, config: SimulationConfig, seed: int, count: int, swing: float = 0.35, switched: bool = False,
                 changed: Callable[[MultibodyPlant], None] | None = None) -> Iterator[Step]:
-    """Steps of a robot that goes to new random goals every 30 steps; switched: servos go off and on again; changed: what is set
-    otherwise on Drake's plant alone."""
+    """Steps of a robot that goes to new random goals every 30 steps; switched: servos go off and on again; changed: settings
+    of Drake's plant alone."""
     random = np.random.default_rng(seed)
     sim = Simulation(model, config)
     if changed is not None:

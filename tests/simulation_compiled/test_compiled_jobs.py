@@ -77,7 +77,7 @@ def test_angles_alone_are_those_of_whole_jobs_whatever_ran_before(robot):
 
 
 def put_back(times: tuple[float, ...]) -> BaseStates:
-    """A base that leans and turns by itself."""
+    """A base with a prescribed lean and turn."""
     turn = np.array([[0.9995, 0.02, -0.01, 0.02], [0.999, -0.015, 0.02, -0.03]])
     v = np.array([[0.05, 0.0, 0.0], [0.03, -0.02, 0.0]])
     return BaseStates(np.array(times), turn, v, 2 * v)
@@ -135,7 +135,7 @@ def test_a_log_that_begins_in_motion_with_a_servo_switched_off(tmp_path, logged,
 
 
 def fall(robot: RobotModel) -> Job:
-    """Onto its belly, as its servos hold nothing: what the compiled station gives up while it runs."""
+    """Falls onto its belly, because its servos hold nothing: the compiled station gives up during this run."""
     limp = replace(robot, servos={j: replace(robot.servo(j), stall_torque=1e-3, coulomb_friction=0.0) for j in robot.joints})
     return replace(walk_job(limp, "free"), duration=0.6, times=np.arange(0.0, 0.6, 0.01))
 

@@ -22,7 +22,7 @@ ROUNDING = 1e-9
 BALL, DEEP = 0.01, 4e-4
 """Radius of the sphere that touches, and how deep [m]."""
 AT = np.array([0.05, 0.02, 0.3])
-"""Middle of what it touches, in W."""
+"""Centre of the touched shape, in W."""
 
 
 def unit(*v: float) -> np.ndarray:
@@ -31,7 +31,7 @@ def unit(*v: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Touch:
-    """What is touched, as SDF, and the sphere's middle in its frame."""
+    """The touched shape, as SDF, and the sphere's centre in its frame."""
 
     solid: str
     middle: np.ndarray

@@ -87,7 +87,7 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
     ({"three": 8.0}, False, {"three"}), ({"three": 8.0}, True, set()), ({"three": 8.0, "two": 4.0}, False, set()),
     ({"three": 4.0}, False, set())])
 def test_of_what_all_joints_show_hundredths_may_be_left_in_all_but_not_in_one_alone(worn, left, given, asked):
-    """As other speeds of all servos hide that a gear of one twists."""
+    """Different speeds of every servo hide the compliance of one servo's gear."""
     session, whole, _ = worn
     search = Search(whole.evaluator, session.model)
     own = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.key == ("backlash", ("three",)))

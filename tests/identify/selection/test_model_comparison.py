@@ -190,7 +190,7 @@ def test_a_name_that_only_the_price_of_its_numbers_keeps_out_stands_beside(name,
 @pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),
                                                     (0.0, "payload", False)])
 def test_a_pull_is_the_twin_of_a_tilt_that_only_floating_base_takes_identify(held, name, told):
-    """Take 0 is held; chi squared of each take stands for its residuals."""
+    """Take 0 is held; each take's residuals are replaced by their chi squared."""
     search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), evaluator=SimpleNamespace(
         cost=lambda residuals, use: sum(residuals.values()), expected=lambda takes, use: 1000.0))
     tilt, other = (SimpleNamespace(name=n, effect=known_effects()[n]) for n in ("ground_tilt", name))
@@ -201,7 +201,7 @@ def test_a_pull_is_the_twin_of_a_tilt_that_only_floating_base_takes_identify(hel
 
 @pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, ODDS.most_from_floating), (-5000.0, -ODDS.most_from_floating)])
 def test_fixed_base_takes_take_the_word_first_of_what_they_told(walks, adds):
-    """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
+    """Take 0 is held, take 1 walks; each take's residuals are replaced by their chi squared."""
     search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), floating_base=lambda takes: (1,),
                              evaluator=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
     fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})

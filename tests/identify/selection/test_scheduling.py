@@ -38,7 +38,7 @@ def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatc
 @pytest.mark.parametrize(("base", "tier", "said"),
                          [("fixed", 2, False), ("free", 2, False), ("free", SCHEDULING.tiers_of_all, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
-    """What a hand carries looks like a weak shoulder."""
+    """A load on the hand looks like a weak shoulder."""
     search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"), floating_base=lambda takes: ())
     shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
     for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
@@ -60,7 +60,7 @@ def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_fr
 @pytest.mark.parametrize(("spring", "stop", "chosen"), [(5.6e7, 3.9e7, ["joint_stop"]), (5.6e7, 2.0e7, ["parallel_spring"]),
                                                         (3.0e7, 3.9e7, ["joint_stop"])])
 def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it(spring, stop, chosen):
-    """Beside a load and a weak elbow a spring closed more of a shoulder's gap than the stop at which all recordings end."""
+    """With a load and a weak elbow, a spring closed more of a shoulder's gap than the stop at which all recordings end."""
     known = known_effects()
     at_stop = Candidate.of(known["joint_stop"], ("one",), (-180.0, 57.0), (-180.0, 6.0), (True, False))
     stiff = Candidate.of(known["parallel_spring"], ("one",), (0.0,))
@@ -75,7 +75,7 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     ((0.16, 0.97), 514.0, ["com_shift"]), ((0.6, 0.97), 514.0, ["soft_ground", "com_shift"]),
     ((0.16, 0.85), 514.0, ["soft_ground", "com_shift"]), ((0.16, 0.97), 300.0, ["soft_ground"])])
 def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_about_the_same(closed, gain, chosen):
-    """Beside a centre of mass elsewhere soft ground brought a tenth more, by one number for three, and closed a sixth."""
+    """Soft ground gained a tenth more than a displaced centre of mass, by one parameter and not three, and closed a sixth."""
     known = known_effects()
     soft = Candidate.of(known["soft_ground"], (), (1e5,))
     shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
@@ -110,7 +110,7 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
 
 
 def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while_held(worn, monkeypatch):
-    """A stop may lie beyond what was moved then, and gravity may have left a loose mount on one side."""
+    """A stop may lie outside the range of those motions, and gravity may have held a loose mount on one side."""
     _, search, nominal = worn
     well = next(iter(scheduling.well_on_fixed_base(search, nominal)[0]))
     monkeypatch.setattr(search, "floating_base", lambda takes: takes)
@@ -174,7 +174,7 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
 
 
 def test_a_rear_body_is_heavy_at_a_tenth_a_thigh_is_not(monkeypatch):
-    """What a trunk's link carries tips the robot; a leg's own joints feel what it carries."""
+    """A load on a trunk's link tips the robot; a load on a leg is felt by that leg's joints."""
     model = puppy_model()
     masses = {"body_link": 0.4, "tail_link": 0.1, "flm_link": 0.1, "frm_link": 0.2, "head_link": 0.08, "neck_link": 0.12}
     kinematics = replace(model.kinematics, masses=dict.fromkeys(model.kinematics.links, 0.0) | masses)

@@ -15,7 +15,7 @@ from workbench.identify.selection.options import SUBSETS
 RNG = np.random.default_rng(8)
 FRICTION, PLAY, OTHER = RNG.normal(size=(3, 600))
 DOES = {"viscous_friction": FRICTION, "backlash": PLAY, "dead_band": PLAY + 0.6 * OTHER, "servo_gain": OTHER}
-"""What each effect does to a joint, in sigma, at its typical size: a dead band looks like play from afar."""
+"""Response of a joint to each effect, in sigma, at its typical size: a dead band looks like play from afar."""
 RECORDED = 1.5 * FRICTION + 2.0 * DOES["dead_band"]
 
 
