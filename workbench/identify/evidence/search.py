@@ -155,7 +155,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
     states = [without(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
     made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J)
                                     for h, J in states])
-    fits = _with_better(found.fits, made)
+    fits = with_better(found.fits, made)
     return (yield from _extended(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
 
 
@@ -180,7 +180,7 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
-    fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
+    fits = with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
 
@@ -197,7 +197,7 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
     return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 
 
-def _with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
+def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
     """Of each set of effects the likelier fit."""
     out = dict(fits)
     for f in more:
@@ -249,7 +249,7 @@ def _refitted(found: Found, options: EvidenceOptions) -> Asks[Found]:
     made = yield from side_by_side([
         *(polished(region, options, f) for f in near),
         *(fitting(region, options, _as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
-    return replace(found, fits=_with_better(found.fits, [*made, *(reduced(region, options, f) for f in made)]))
+    return replace(found, fits=with_better(found.fits, [*made, *(reduced(region, options, f) for f in made)]))
 
 
 def _as_published(h: Hypothesis) -> Hypothesis:
@@ -260,7 +260,7 @@ def _as_published(h: Hypothesis) -> Hypothesis:
 def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) -> Found:
     """With more fits, as far as they are of the same uncertain numbers."""
     mine = [judged(found.region, options, f.hypothesis, f.r, f.J) for f in fits if f.hypothesis.numbers == found.region.numbers]
-    return replace(found, fits=_with_better(found.fits, mine))
+    return replace(found, fits=with_better(found.fits, mine))
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
@@ -281,7 +281,7 @@ def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candi
     fit = yield from fitting(found.region, options, h, best.discrepancy, options.iterations, None, J)
     fits = {key: f for key, f in found.fits.items() if not any(c.key in names for c in f.hypothesis.effects)}
     region = replace(found.region, candidates=tuple(c for c in found.region.candidates if c.key not in names))
-    return replace(found, region=region, fits=_with_better(fits, [fit]))
+    return replace(found, region=region, fits=with_better(fits, [fit]))
 
 
 def with_best(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:

@@ -17,18 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, without
-from workbench.identify.evidence.hypothesis import Hypothesis, Prior, Term, log_odds, start
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.search import Found, with_better
 from workbench.identify.evidence.torque_law import TorqueLaw
 from workbench.types import Array
 
 if TYPE_CHECKING:
-    from workbench.identify.evidence.search import Found
     from workbench.identify.parameters import Candidate
 
 Scales = Mapping[str, float]
-Key = frozenset[Term]
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,8 @@ def _with(found: Found, made: Sequence[Fitted], options: EvidenceOptions) -> Fou
     closest = sorted(every, key=lambda f: f.discrepancy)[:options.beam]
     alike = [f.r for f in closest if f.discrepancy < options.grown * closest[0].discrepancy]
     region = found.region.correlated(float(np.median([found.region.correlation(r) for r in alike])))
-    fits: dict[Key, Fitted] = {}
-    for f in (judged(region, options, f.hypothesis, f.r, f.J, f.beside) for f in every):
-        fits[f.hypothesis.key] = max(f, fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
-    return replace(found, region=region, fits=fits)
+    fits = [judged(region, options, f.hypothesis, f.r, f.J, f.beside) for f in every]
+    return replace(found, region=region, fits=with_better({}, fits))
 
 
 def _followed(region: Region, options: EvidenceOptions, at: _State) -> Asks[list[Fitted]]:
