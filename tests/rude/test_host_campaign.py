@@ -16,9 +16,10 @@ FOUND = [
     ("STS3215", "second program", 450, 3),
     ("XL-330", "garbled command", 5, 198),
     ("AX-12A", "garbled command", 11, 791),
+    ("AX-12A", "stall", 252, 940),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
-lost on the wire, or were sent in a bunch after a stall, and exit code 0; answers to another
+lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
 program's questions in the log; torque that stayed on where a start failed."""
 
 

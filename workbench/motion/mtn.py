@@ -101,7 +101,7 @@ class MtnFile:
                 raise InputError(self.source, f"bus ID {i}: motor type {motor}; expected 0 (1024 counts, 300 deg)")
         joints = tuple(sorted(by_id[i] for i in moved))
         mounted = [(mountings or {}).get(j, Mounting()) for j in joints]
-        zeros = [m.zero if m.zero is not None else 512 + round(m.offset / COUNT) for m in mounted]
+        zeros = [m.zero_count(512, COUNT) for m in mounted]
         steps = (page.positions[:, [bus_ids[j] for j in joints]] - np.array(zeros)) * COUNT * [m.direction for m in mounted]
         loops = page.repeat > 1 or page.next == page.number
         times, rows = [0.0], [steps[-1] if loops else np.zeros(len(joints))]

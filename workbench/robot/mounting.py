@@ -37,6 +37,10 @@ class Mounting:
         """Whether joint and servo have the same angle."""
         return self == Mounting()
 
+    def zero_count(self, centre: int, count: float) -> int:
+        """Position in counts at which the joint is at zero. centre: position of the servo's angle zero. count: one count [rad]."""
+        return round(self.zero) if self.zero is not None else centre + round(self.offset / count)
+
 
 @dataclass(frozen=True)
 class JointServo:
@@ -48,8 +52,7 @@ class JointServo:
     @property
     def zero(self) -> int:
         """Position in counts at which the joint is at zero."""
-        given = self.mounting.zero
-        return round(given) if given is not None else self.profile.centre + round(self.mounting.offset / self.profile.count)
+        return self.mounting.zero_count(self.profile.centre, self.profile.count)
 
     def angle(self, position: float) -> float:
         """The joint's angle [rad] at a position in counts."""

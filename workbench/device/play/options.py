@@ -41,8 +41,8 @@ class Played:
     on the bus's clock [s]. worst_late: by which a pose was late [s]. stopped: why it ended early, "" where it did not. released:
     whether torque is off. unknown: joints that did not confirm it when they were asked. rates: readings of each joint in the
     motion, a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time,
-    and poses sent only when the next one was due. log_problem: why there is no joint log, "" where there is one. log_start: time
-    zero of the log, on the bus's clock [s]; NaN where unknown."""
+    and poses sent with less than a tenth of their time left. log_problem: why there is no joint log, "" where there is one.
+    log_start: time zero of the log, on the bus's clock [s]; NaN where unknown."""
 
     journal: Path
     started: float

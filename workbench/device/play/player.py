@@ -20,6 +20,8 @@ from workbench.robot.mounting import JointServo
 from workbench.types import Progress
 
 HOLDING = "the servos could not be told to let go and may hold their last goal: switch the robot's power off"
+HELD = 0.1
+"""Share of its time that has to be left of a pose when it is sent: with less, the robot hardly moves towards it."""
 
 
 def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop: Callable[[], str],
@@ -202,7 +204,7 @@ class _Performance:
             self.poses += 1
             if not k:
                 self.started, packet = sent, sent - begun
-            self.overtaken += sent - self.started > ends[k]
+            self.overtaken += ends[k] - (sent - self.started) < HELD * (ends[k] - time)
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
         self.ended, self.read = bus.now(), rig.readings - self.read_before

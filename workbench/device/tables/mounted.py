@@ -13,11 +13,8 @@ from workbench.robot.mounting import Mounting
 
 def zeros(table: PoseTable, mountings: Mapping[str, Mounting]) -> list[int]:
     """Count at which each joint of the table is at zero."""
-    out = []
-    for joint, units in zip(table.joints, table.units):
-        m = mountings.get(joint, Mounting())
-        out.append(round(m.zero) if m.zero is not None else units.centre + round(m.offset / units.count))
-    return out
+    return [mountings.get(joint, Mounting()).zero_count(units.centre, units.count)
+            for joint, units in zip(table.joints, table.units)]
 
 
 def in_servo_counts(table: PoseTable, mountings: Mapping[str, Mounting]) -> PoseTable:
