@@ -28,8 +28,6 @@ from workbench.view.report.comparison import write_comparison
 from workbench.view.report.diagnosis import write_diagnosis
 from workbench.view.report.notebook import comparison_html, diagnosis_html, prediction_html
 
-"""Called with the current stage and the share done (0 to 1; None where it is not known)."""
-
 
 @dataclass(frozen=True)
 class ComparisonResult:

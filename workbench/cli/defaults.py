@@ -1,4 +1,5 @@
 """A user's own defaults, from a YAML file: `VERB: {option: value}`; those under `all` apply to every verb that has the option.
+
     diagnose: {jobs: 8}
     all: {model: my_robot/model.yaml}
 

@@ -44,16 +44,16 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     if float(np.median(np.diff(log.time))) > c.slowest:
         return none, []
     steps = np.diff(log.position)
+    extra = steps[1:-1] - (steps[:-2] + steps[2:]) / 2  # beyond the mean of its neighbours, of step i + 1
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
     far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
-    asked = {k for k in inside if _goal_stepped(log, k, float(steps[k]) - _usual(steps, k), c)}
-    at = [k for k in inside if k not in asked and _stands_out(steps, k, c)] or \
-        [k for k in inside if k not in asked and _leaps(log, k, abs(float(steps[k]) - _usual(steps, k)), far)]
+    at = [k for k in inside if _stands_out(steps, extra, k, c) and not _goal_stepped(log, k, extra[k - 1], c)] or \
+        [k for k in inside if _leaps(log, k, abs(extra[k - 1]), far) and not _goal_stepped(log, k, extra[k - 1], c)]
     if not at:
         return none, []
     edges = [0, *(k + 1 for k in at), len(log.rows)]
-    jumps = np.array([steps[k] - _usual(steps, k) for k in at])
+    jumps = extra[np.array(at) - 1]
     level = np.concatenate([[0.0], np.cumsum(jumps)])
     undone = log.position - np.repeat(level, np.diff(edges))
     fit = fit_response(shapes(log.time, log.goal), undone)
@@ -77,24 +77,19 @@ def _leaps(log: JointLog, k: int, jump: float, far: float) -> bool:
     return jump > far and bool(np.all(np.diff(log.rows[around]) == 1))
 
 
-def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:
-    """Whether step `k` differs from its neighbours, which agree, by more than steps differ nearby."""
-    bend = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2)  # of step i + 1
-    around = np.concatenate([bend[max(k - 2 - c.near, 0):max(k - 2, 0)], bend[k + 1:k + 1 + c.near]])
-    jump = abs(steps[k] - _usual(steps, k))
-    return bool(jump > max(np.deg2rad(c.least), c.times * float(np.max(around, initial=0.0)))
-                and abs(steps[k + 1] - steps[k - 1]) < jump / 3)
-
-
-def _usual(steps: Array, k: int) -> float:
-    """Travel of the joint between the rows around step `k` [rad]."""
-    return float(steps[k - 1] + steps[k + 1]) / 2
+def _stands_out(steps: Array, extra: Array, k: int, c: ShiftChecks) -> bool:
+    """Whether step `k` differs from its neighbours, which agree, by more than steps differ nearby. extra: of step i + 1."""
+    jump = abs(extra[k - 1])
+    if jump <= np.deg2rad(c.least) or abs(steps[k + 1] - steps[k - 1]) >= jump / 3:
+        return False
+    around = np.abs(np.concatenate([extra[max(k - 2 - c.near, 0):max(k - 2, 0)], extra[k + 1:k + 1 + c.near]]))
+    return bool(jump > c.times * float(np.max(around, initial=0.0)))
 
 
 def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     """Whether a goal stepped the same way shortly before."""
-    before = (log.time >= log.time[k] - c.before) & (log.time <= log.time[k + 1])
-    goals = np.diff(log.goal[before])
+    first, end = np.searchsorted(log.time, log.time[k] - c.before), np.searchsorted(log.time, log.time[k + 1], side="right")
+    goals = np.diff(log.goal[first:end])
     bend = goals[1:-1] - (goals[:-2] + goals[2:]) / 2
     return bool(len(bend) and np.max(bend * np.sign(step)) > c.goal * abs(step))
 
