@@ -25,7 +25,8 @@ Asks = Generator[list[Hypothesis], list[Array], T]
 @dataclass(frozen=True)
 class Fitted:
     """r (n,): residuals [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of the set of
-    effects; too_much (k, k): apparent information in J that is only noise of J, where that is known."""
+    effects; too_much (k, k): apparent information in J that is only noise of J, where that is known; beside (n, m): of r by the
+    weights of an unnamed torque, where it has one."""
 
     hypothesis: Hypothesis
     r: Array = field(repr=False)
@@ -153,6 +154,17 @@ def _of_rank_one(J: Array, precision: Array) -> Array:
     """Slopes (n, 2) of two parameters with the same response: the nearest ones that are multiples of each other."""
     along = np.linalg.svd(np.sqrt(precision)[:, None] * J, full_matrices=False)[2][0]
     return np.asarray(np.outer(J @ along, along))
+
+
+def slopes(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:
+    """Slopes (n, k) of a hypothesis' residuals r by theta, from differences."""
+    low, high = h.bounds()
+    steps = np.where(h.theta + options.stride <= high, options.stride, -options.stride)
+    steps = np.where(h.theta + steps < low, 0.5 * (high - low), steps)
+    if not len(steps):
+        return np.empty((len(r), 0))
+    left = yield [h.at(h.theta + by) for by in np.diag(steps)]
+    return np.column_stack([(moved - r) / by for moved, by in zip(left, steps)])
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, slopes, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
@@ -190,9 +190,8 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
     h = start(region.numbers)
     if not len(h.theta):
         return []
-    steps = np.where(h.theta + options.stride <= h.bounds()[1], options.stride, -options.stride)
-    r, *moved = yield [h, *(h.at(h.theta + by) for by in np.diag(steps))]
-    there = judged(region, options, h, r, np.column_stack([(m - r) / by for m, by in zip(moved, steps)]))
+    (r,) = yield [h]
+    there = judged(region, options, h, r, (yield from slopes(options, h, r)))
     moves = yield from linearised(region, options, there)
     return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 

@@ -81,9 +81,11 @@ def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[li
 def shared_by_tie(f: Finding, told: GravityOverTorque | None, options: EvidenceOptions) -> Finding:
     """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with the tie's
     probability shared among all of them."""
-    near = [] if told is None else [n for n in told.names if n.behind < options.occam]
+    if told is None:
+        return f
+    near = [n for n in told.names if n.behind < options.occam]
     others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
-    if told is None or not others or len(others) == len(near):
+    if not others or len(others) == len(near):
         return f
     each = min(f.confidence, told.confidence / len(near))
     return replace(f, confidence=each, alternatives=(Alternative(others[0].effect, others[0].where, each),))

@@ -9,21 +9,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.evidence.options import LawOptions
+from workbench.identify.rollouts.servo_logs import frames
 from workbench.robot.torque_table import DependsOn, TorqueTable
-from workbench.servo import Instant
+from workbench.servo import Instant, ServoLaw
 from workbench.servo.tabled import Tabled
 from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.robot import RobotModel
-
 
 
 @dataclass(frozen=True)
@@ -89,26 +90,22 @@ class TorqueLaw:
 
     def tables(self) -> tuple[TorqueTable, ...]:
         """As a servo has it: one for each quantity that the torque depends on."""
-        out, first = [], 0
-        for f in self.functions:
-            own = self.weights[first:first + f.values.shape[1]]
-            first += f.values.shape[1]
-            if own.any():
-                out.append(TorqueTable(f.depends_on, tuple(f.at.tolist()), tuple((f.values @ own).tolist())))
-        return tuple(out)
+        return tuple(TorqueTable(f.depends_on, tuple(f.at.tolist()), tuple((f.values @ self.weights[own]).tolist()))
+                     for f, own in self._present())
 
     def spread(self, covariance: Array) -> tuple[tuple[float, ...], ...]:
         """Standard deviations of each table's torques [N m], from the covariance of the active weights."""
-        out, first, active = [], 0, self.active
+        active = self.active
         whole = np.zeros((len(active), len(active)))
         whole[np.ix_(active, active)] = covariance
-        for f in self.functions:
-            own = slice(first, first + f.values.shape[1])
-            first = own.stop
-            if self.weights[own].any():
-                variance = np.einsum("ki,ij,kj->k", f.values, whole[own, own], f.values)
-                out.append(tuple(np.sqrt(np.maximum(variance, 0.0)).tolist()))
-        return tuple(out)
+        variances = (np.einsum("ki,ij,kj->k", f.values, whole[own, own], f.values) for f, own in self._present())
+        return tuple(tuple(np.sqrt(np.maximum(v, 0.0)).tolist()) for v in variances)
+
+    def _present(self) -> list[tuple[Functions, slice]]:
+        """The functions of which there is a table, each with the place of its weights."""
+        ends = np.cumsum([0, *(f.values.shape[1] for f in self.functions)]).tolist()
+        each = zip(self.functions, (slice(a, b) for a, b in pairwise(ends)))
+        return [(f, own) for f, own in each if self.weights[own].any()]
 
     def rms(self, evidence: Sequence[TakeEvidence], model: RobotModel) -> float:
         """RMS over the joint's motion in some takes [N m]."""
@@ -165,7 +162,7 @@ def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> 
     for e in evidence:
         if joint not in e.channels:
             continue
-        rows = (e.uses["fit"] | e.uses["choose"]) & (e.since >= 0) & (e.since <= e.until)
+        rows = (e.uses["fit"] | e.uses["choose"]) & frames(e)
         q = e.recorded[:, e.channels.index(joint)]
         rows &= np.isfinite(q)
         if rows.sum() < 3:
@@ -177,8 +174,7 @@ def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> 
             k = np.clip(np.searchsorted(commands.times, since, side="right") - 1, 0, None)
             servo = e.take.spec.robot(model).servo(joint)
             error = commands.goals[k, commands.joints.index(joint)] - q
-            beyond = np.maximum(np.abs(error) - servo.margin, 0.0)
-            duty = np.copysign(np.clip(servo.punch_duty * (beyond > 0) + servo.gain * beyond, 0.0, 1.0), error)
+            duty = ServoLaw.of([servo]).duty(error[:, None])[:, 0]
         out.append((q, np.gradient(q, since), duty))
     angle, speed, duty = (np.concatenate([np.empty(0), *column]) for column in zip(*out)) if out else (np.empty(0),) * 3
     return angle, speed, duty

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, without
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, slopes, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
@@ -88,7 +88,7 @@ def on_windows(found: Found, options: EvidenceOptions) -> Asks[Found]:
     best = found.best
     (r,) = yield [best.hypothesis]
     region = found.region.correlated(min(options.explored, found.region.correlation(r)))
-    J = yield from _by_theta(options, best.hypothesis, r)
+    J = yield from slopes(options, best.hypothesis, r)
     fit = judged(region, options, best.hypothesis, r, J)
     return replace(found, region=region, fits={fit.hypothesis.key: fit})
 
@@ -193,22 +193,11 @@ def _objective(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array
 
 def _measured(options: EvidenceOptions, at: _State) -> Asks[_State]:
     """A state with its slopes measured there, those of weights that are not there left as they are."""
-    J = yield from _by_theta(options, at.h, at.r)
+    J = yield from slopes(options, at.h, at.r)
     B = at.B.copy()
     active = at.law.active
     B[:, active] = (yield from _by_weights(at.h, at.r, options.law.probe * at.law.full_torque, active))[:, active]
     return _State(at.h, at.r, J, B)
-
-
-def _by_theta(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:
-    """Slopes (n, k) of r by theta, from differences."""
-    low, high = h.bounds()
-    theta, k = h.theta, len(h.theta)
-    steps = np.where(theta + options.stride <= high, options.stride, -options.stride)
-    steps = np.where(theta + steps < low, 0.5 * (high - low), steps)
-    moved = [h.at(theta + steps[i] * np.eye(k)[i]) for i in range(k)]
-    left = (yield moved) if moved else []
-    return np.column_stack([(other - r) / step for other, step in zip(left, steps)]) if k else np.empty((len(r), 0))
 
 
 def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]) -> Asks[Array]:
