@@ -38,7 +38,7 @@ class Mounting:
         return self == Mounting()
 
     def zero_count(self, centre: int, count: float) -> int:
-        """Position in counts at which the joint is at zero. centre: position of the servo's angle zero. count: one count [rad]."""
+        """Position in counts at which the joint is at zero. centre: position at the servo's zero. count: one count [rad]."""
         return round(self.zero) if self.zero is not None else centre + round(self.offset / count)
 
 
