@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,6 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey
-    from workbench.device.bus.wire import slow_adapter
     from workbench.robot.servo_registers import save_registers
 
     if args.model is None and not (args.write or args.set_id or args.wiggle or args.out):
@@ -66,31 +66,34 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         path = save_registers(registers, args.out / "registers.yaml")
         print(f"wrote {path}; with `registers: {path.name}` in a session.yaml, `diagnose` starts from these registers")
-    if slow_adapter(found.latency):
-        print(f"workbench servos: warning: {slow_adapter(found.latency)}", file=sys.stderr)
-    for problem in found.problems():
-        print(f"workbench servos: problem: {problem}", file=sys.stderr)
-    return 2 if found.problems() else 0
+    return _warn([found])
 
 
 def _list(args: argparse.Namespace) -> int:
     """Every servo of every family that is known, without a model; 2 where something is wrong with one."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.listing import list_servos
-    from workbench.device.bus.wire import slow_adapter
 
     virtual = make_virtual(args, load_model(PUPPY, args.packages)) if args.port == VIRTUAL else None
     with Progress("servos") as progress, open_servo_port(args, virtual) as port:
         surveys = list_servos(port, args.echo, progress)
     for found in surveys:
         _show(found)
+    code = _warn(surveys)
+    print("compare them with a robot: --model NAME")
+    return code
+
+
+def _warn(surveys: Sequence[Survey]) -> int:
+    """Tells of a slow adapter and of all problems; the exit code."""
+    from workbench.device.bus.wire import slow_adapter
+
+    slow = slow_adapter(max(found.latency for found in surveys))
+    if slow:
+        print(f"workbench servos: warning: {slow}", file=sys.stderr)
     problems = [problem for found in surveys for problem in found.problems()]
-    late = max(found.latency for found in surveys)
-    if slow_adapter(late):
-        print(f"workbench servos: warning: {slow_adapter(late)}", file=sys.stderr)
     for problem in problems:
         print(f"workbench servos: problem: {problem}", file=sys.stderr)
-    print("compare them with a robot: --model NAME")
     return 2 if problems else 0
 
 
