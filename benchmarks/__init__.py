@@ -1,2 +1,2 @@
-"""The speeds that the documentation states, measured side by side in one run; without MuJoCo's robot (studies/) its
-figure is left out."""
+"""Measures the speeds stated in the documentation, all in one run. Figures that compare with MuJoCo are skipped where
+studies/ is not available."""

@@ -1,4 +1,4 @@
-"""A small arm with one joint that differs from what its description says, and a log of it: what fits are timed on."""
+"""The robot and the servo log on which fits are timed: a small arm, one joint of which differs from its description."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from workbench.types import Array
 
 JOINTS = ("one", "three", "two")
 ODD = "two"
-"""The joint that differs."""
+"""The joint whose friction differs from the description."""
 EXTRA = 0.05, 0.04
-"""Of its Coulomb friction [N m] and viscous friction [N m s/rad] beyond nominal."""
+"""Coulomb friction [N m] and viscous friction [N m s/rad] that ODD has in addition to the nominal ones."""
 PERIOD = 0.01
-"""Between rows of the log [s]."""
+"""Time between two rows of the log [s]."""
 COUNT = float(np.deg2rad(0.088))
-"""To which servos tell angles [rad]."""
+"""Resolution of the servos' angle sensors [rad]."""
 NOISE = float(np.deg2rad(0.05))
-"""Standard deviation before that [rad]."""
+"""Standard deviation of the angle noise, before rounding to counts [rad]."""
 TRUE_STEP = 1e-4
-"""Of a rollout that is recorded, where the engine is quick enough [s]."""
+"""Time step of a recorded rollout in MuJoCo, which is fast enough for so small a step [s]."""
 PLAYED_STEP = 2.5e-4
-"""Of one of the station [s]."""
+"""Time step of a recorded rollout in the station [s]."""
 SERVO = {"stall_torque": 1.5, "no_load_speed": 6.18, "rated_voltage": 12.0, "supply_voltage": 11.1, "coulomb_friction": 0.06,
          "viscous_friction": 0.01, "reflected_inertia": 6.5e-3, "proportional_gain": 5.0}
-"""A proportional law, which MuJoCo's actuators can be without a rest."""
+"""A purely proportional law, which MuJoCo's actuators reproduce exactly."""
 
 
 def _link(name: str, z: float) -> str:
@@ -42,7 +42,8 @@ def _link(name: str, z: float) -> str:
 
 
 def arm_sdf(fixed: bool = False) -> str:
-    """trunk, upper, middle, lower upwards on the joints one (y), two (y), three (x); welded to the world if `fixed`."""
+    """SDF of the links trunk, upper, middle and lower, stacked upwards on the joints one (about y), two (y) and three (x);
+    the trunk is welded to the world if `fixed`."""
     links = "".join(_link(n, z) for n, z in (("trunk", 0.1), ("upper", 0.2), ("middle", 0.28), ("lower", 0.36)))
     joints = "".join(
         f'<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child><axis><xyz>{axis}</xyz><limit>'
@@ -55,7 +56,7 @@ def arm_sdf(fixed: bool = False) -> str:
 
 @dataclass(frozen=True)
 class Log:
-    """What a servo bus tells: times (N,) [s], goals and angles (N, n) [rad] of JOINTS."""
+    """A log of the servo bus: times (N,) [s], goals and measured angles (N, n) [rad] of JOINTS."""
 
     time: Array
     goals: Array
@@ -63,12 +64,12 @@ class Log:
 
     @property
     def commands(self) -> Commands:
-        """The goals as what went out on the bus."""
+        """The goals as commands that were sent on the bus."""
         return commands_of_rows(self.time, JOINTS, self.goals, np.ones(self.goals.shape, dtype=bool))
 
 
 def arm(folder: Path) -> RobotModel:
-    """The nominal arm, its description written into a folder."""
+    """The nominal arm; its description is written into `folder`."""
     (folder / "arm.sdf").write_text(arm_sdf(), encoding="utf-8")
     (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO), encoding="utf-8")
     (folder / "log.csv").write_text("time,goal.one\n0,0\n1,0\n", encoding="utf-8")
@@ -76,7 +77,7 @@ def arm(folder: Path) -> RobotModel:
 
 
 def session(folder: Path, log: Log) -> Session:
-    """The arm's session in that folder with one log."""
+    """The session of the arm in `folder`, with this log as its only take."""
     channels = {f"{kind}.{j}": values[:, i] for kind, values in (("goal", log.goals), ("position", log.angles))
                 for i, j in enumerate(JOINTS)}
     write_joint_log(folder / "log.csv", log.time, channels)
@@ -91,8 +92,8 @@ def _session(folder: Path) -> Session:
 
 
 def goals(duration: float) -> Log:
-    """Slow and quick swings of every joint from rest in neutral, so that Coulomb and viscous friction show apart; angles are
-    still zero."""
+    """Slow and fast swings of every joint from rest in neutral, so that Coulomb and viscous friction can be told apart. The
+    angles are zeros, to be filled in by `measured`."""
     time = np.asarray(PERIOD * np.arange(round(duration / PERIOD) + 1), dtype=np.float64)
     begins = np.clip(time / 0.3, 0, 1)
     columns = [begins * (a * np.sin(2 * np.pi * f * time) + 0.3 * a * np.sin(2 * np.pi * 3.1 * f * time))
@@ -101,7 +102,7 @@ def goals(duration: float) -> Log:
 
 
 def played(model: RobotModel, log: Log, effects: tuple[EffectSpec, ...]) -> Array:
-    """Angles (N, n) [rad] of the arm with these effects at the log's times, in small steps."""
+    """Angles (N, n) [rad] at the log's times of the arm with these effects, simulated in steps of PLAYED_STEP."""
     for effect in effects:
         model = model.with_effect(effect)
     config = SimulationConfig(base="fixed", contact_period=0, time_step=PLAYED_STEP)
@@ -110,12 +111,12 @@ def played(model: RobotModel, log: Log, effects: tuple[EffectSpec, ...]) -> Arra
 
 
 def measured(log: Log, angles: Array, seed: int) -> Log:
-    """With angles (N, n) [rad] as servos tell them: noise, in whole counts."""
+    """The log with angles (N, n) [rad] as servos report them: noisy, and rounded to whole counts."""
     noisy = angles + np.random.default_rng(seed).normal(0.0, NOISE, angles.shape)
     return Log(log.time, log.goals, COUNT * np.round(noisy / COUNT))
 
 
 def frictions() -> tuple[EffectSpec, EffectSpec]:
-    """What is odd about the joint ODD."""
+    """The effects that give ODD its additional friction."""
     return (EffectSpec("coulomb_friction", (ODD,), {"torque": EXTRA[0]}),
             EffectSpec("viscous_friction", (ODD,), {"coefficient": EXTRA[1]}))

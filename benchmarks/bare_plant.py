@@ -1,4 +1,4 @@
-"""What a station is measured against: the same model, contact, ground and step, and nothing but Drake's own PD."""
+"""The baseline for the station's speed: the same model, contact, ground and step, driven only by Drake's own PD controllers."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from workbench.simulation.reference import ConnectReference, linear_trajectory, 
 
 
 class BarePlant:
-    """The robot with free base and point contact, as anyone would build it in Drake: PD with the gain of the servo law, back-EMF
-    and viscous friction as joint damping, reflected inertia, the servos' ramped reference from a TrajectorySource.
+    """The robot with free base and point contact, built in Drake in the usual way: PD with the gain of the servo law, back-EMF
+    and viscous friction as joint damping, reflected inertia, and the servos' ramped reference from a TrajectorySource.
 
-    No joint friction, no margin, no punch, no log. A run starts where `take` starts and lasts as long."""
+    It has no joint friction, margin, punch or log. A run starts from the first state of `take` and lasts as long."""
 
     def __init__(self, model: RobotModel, commands: Commands, take: Take, step: float) -> None:
         diagram = _build(model, step)
@@ -48,13 +48,13 @@ class BarePlant:
         self._simulator = Simulator(diagram, self._context)
 
     def run(self) -> None:
-        """From the start to the end."""
+        """Simulates the whole motion from the start."""
         self._context.SetTimeStateAndParametersFrom(self._start)
         self._simulator.Initialize()
         self._simulator.AdvanceTo(self._end)
 
     def joint_angles(self) -> NDArray[np.float64]:
-        """Where the joints are now (n,) [rad], in the model's order."""
+        """Current joint angles (n,) [rad], in the model's order."""
         return np.array([joint.get_angle(self._plant_context) for joint in self._joints])
 
 

@@ -1,4 +1,4 @@
-"""The compiled station: a step against Drake's, at the same joint error against MuJoCo's, and a batch on two threads."""
+"""Speed of the compiled station: per step against Drake, at equal joint error against MuJoCo, and on two threads against one."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 
 HELD, WALKING = 50.0, 25.0
-"""Times that a compiled step is to be quicker than Drake's, with the base held and free."""
+"""Required speed of a compiled step over Drake's, with the base held and free."""
 OVER_MUJOCO = {"fixed": 4.0, "free": 2.0}
+"""Required real-time factor over MuJoCo's, by base."""
 SETTLING = 1e-3
-"""[s]: a run of no length, whose time is not the steps' that are counted."""
+"""Duration [s] of a run with hardly any steps, which gives the fixed cost of a job."""
 
 
 def compiled_against_drake(model: RobotModel, commands: Commands, duration: float, step: float, repeats: int) -> list[Figure]:
-    """Processor time of Drake's jobs over that of the compiled station's, the same jobs, per step: base held, standing on the
-    floor, walking. What a job costs without any steps is taken off both."""
+    """Processor time per step of Drake's jobs over that of the same jobs in the compiled station: base held, standing on the
+    floor, and walking. The fixed cost of a job is subtracted from both."""
     still = replace(commands, goals=0.2 * commands.goals)
     cases = {"held": ("fixed", commands, HELD), "standing": ("free", still, WALKING), "walking": ("free", commands, WALKING)}
     return [_step_ratio(model, name, base, played, duration, step, repeats, least)
@@ -54,7 +55,7 @@ def _step_ratio(model: RobotModel, name: str, base: str, commands: Commands, dur
 
 def compiled_against_mujoco(model: RobotModel, commands: Commands, duration: float, exact: Take, finest: float, step: float,
                             repeats: int) -> Figure:
-    """As `engine.station_against_mujoco`, by the compiled station: whole jobs, building and settling included."""
+    """Like `engine.station_against_mujoco`, but for the compiled station and for whole jobs, including building and settling."""
     base = exact.base
     name = f"compiled_against_mujoco_{base}_base"
     meaning = (f"real-time factor of the compiled station over MuJoCo's at the same joint error, base {base}; both with the full "
@@ -82,7 +83,7 @@ def compiled_against_mujoco(model: RobotModel, commands: Commands, duration: flo
 
 def batch_on_two_threads(model: RobotModel, commands: Commands, duration: float, rollouts: int, repeats: int, seed: int
                          ) -> Figure:
-    """Compiled rollouts of the walk, each at an amplitude of its own; wall time."""
+    """Wall time of compiled rollouts of the walk, each with a different amplitude."""
     config = SimulationConfig(contact_period=0.0)
     amplitudes = np.random.default_rng(seed).uniform(0.8, 1.0, rollouts)
     times = np.arange(0.0, duration, 1 / 120)

@@ -1,4 +1,4 @@
-"""Where the time of one diagnosis goes."""
+"""Processor time of one diagnosis, by stage."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ READING, RACE = "reading, registering, floors of the nominal robot", "screening,
 EXPERIMENT = "next experiment"
 STAGES = (("reading", READING), ("simulating", READING), ("registering", READING), ("fitting together", "fits together"),
           ("explaining", RACE), ("rivals", "rivals"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))
-"""How what `diagnose_session` says begins, and the stage that this is."""
+"""How each progress message of `diagnose_session` begins, and the stage it belongs to."""
 REPEATS = 3
 
 
 class Stages:
-    """A `progress` that sums up seconds by stage; of processor time, which other work disturbs least."""
+    """A `progress` callback that sums up the seconds of each stage. By default it counts processor time, which other work on the
+    machine disturbs least."""
 
     def __init__(self, clock: Callable[[], float] = time.process_time) -> None:
         self.seconds: dict[str, float] = {}
@@ -39,12 +40,12 @@ class Stages:
         self._stage = READING
 
     def __call__(self, what: str, done: float | None = None) -> None:
-        """Something new begins, or goes on."""
+        """Starts the stage to which this message belongs, or continues it."""
         self._close()
         self._stage = next((stage for begins, stage in STAGES if what.startswith(begins)), EXPERIMENT)
 
     def ended(self) -> dict[str, float]:
-        """Seconds by stage, in the order in which they began."""
+        """Ends the current stage. Returns the seconds by stage, in the order in which the stages began."""
         self._close()
         return self.seconds
 
@@ -55,7 +56,7 @@ class Stages:
 
 
 def diagnose_time(duration: float | None, seed: int) -> Figure:
-    """duration: of the log [s]; None: skipped."""
+    """duration: of the log [s]; None skips the figure."""
     if duration is None:
         return Figure(NAME, MEANING, skipped="quick: a diagnosis takes longer than the quick form may")
     with TemporaryDirectory() as place:
@@ -79,14 +80,14 @@ def diagnose_time(duration: float | None, seed: int) -> Figure:
 
 
 def _one_rollout(mine: Session, duration: float) -> dict[str, float]:
-    """Processor seconds of one rollout of the nominal robot in the search's step, of building and settling its station, and of
-    one step, without joint friction too, which is a constraint of each joint in Drake's contact solver."""
+    """Processor seconds of one rollout of the nominal robot at the search's step, of building and settling its station, and of
+    one step. The step is also timed without joint friction, which is one constraint per joint in Drake's contact solver."""
     (take,), _ = read_takes(mine)
     steps = round((duration + PROBLEM.rest) / PROBLEM.time_step)
     servos = {j: replace(mine.model.servo(j), coulomb_friction=0.0) for j in mine.model.joints}
     spent = {}
     for name, model in (("as it is", mine.model), ("frictionless", replace(mine.model, servos=servos))):
-        # a time to settle that no rollout had so far, so that the first of these builds its station and the others find it
+        # no earlier rollout had this settling time, so the first of these builds its station and the others reuse it
         config = SimulationConfig(settle=0.6 + PROBLEM.time_step, base="fixed", contact_period=0, time_step=PROBLEM.time_step)
         job = Job(model, config, take.commands, duration, PROBLEM.rest, start=take.start_state())
         first, *more = (_spent(job) for _ in range(1 + REPEATS))

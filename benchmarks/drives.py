@@ -1,4 +1,4 @@
-"""How fast the station is: against a bare Drake plant, against its own finer steps, and on two processes against one."""
+"""Speed of the station: against a bare Drake plant, with the fast servo law and larger steps, and on two processes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
 
 LEAD = 0.1
+"""Simulated rest before the first command [s]."""
 
 
 def station_against_bare_plant(model: RobotModel, commands: Commands, duration: float, step: float, repeats: int) -> list[Figure]:
-    """Speed of the station with the full servo law and its logs, without and with samples of contact forces."""
+    """Speed of the station with the full servo law and its logs, with and without sampled contact forces."""
     stations = {"station": Simulation(model, SimulationConfig(time_step=step, contact_period=0.0)),
                 "with_forces": Simulation(model, SimulationConfig(time_step=step))}
     take = stations["station"].run(commands, duration, LEAD)
@@ -40,7 +41,7 @@ def station_against_bare_plant(model: RobotModel, commands: Commands, duration: 
 
 
 def joint_error(takes: Iterable[Take], exact: Take) -> list[float]:
-    """RMS over joints and time since the first command [rad] by which takes miss a finer one."""
+    """RMS difference [rad] of each take's joint angles from those of `exact`, from the first command on."""
     out = []
     for take in takes:
         moving = take.time >= 0
@@ -50,12 +51,12 @@ def joint_error(takes: Iterable[Take], exact: Take) -> list[float]:
 
 
 def converged(model: RobotModel, commands: Commands, duration: float, base: str, step: float) -> Take:
-    """The full servo law at a step so fine that it stands for the exact motion."""
+    """A rollout with the full servo law at a step so fine that its motion counts as exact."""
     return Simulation(model, SimulationConfig(time_step=step, base=base, contact_period=0.0)).run(commands, duration, LEAD)
 
 
 def fast_servo_and_larger_steps(model: RobotModel, commands: Commands, duration: float, exact: Take, repeats: int) -> Figure:
-    """Speed and joint error of what is faster than the full law at 1 ms, on a held base, where errors do not grow."""
+    """Speed and joint error of the full and the fast servo law at 1, 2 and 4 ms; the base is held, so that errors do not grow."""
     configs = {f"{drive} at {1e3 * step:g} ms": SimulationConfig(time_step=step, base="fixed", drive=drive)
                for drive in ("servo", "fast_servo") for step in (1e-3, 2e-3, 4e-3)}
     stations = {name: Simulation(model, config) for name, config in configs.items()}
@@ -72,7 +73,7 @@ def fast_servo_and_larger_steps(model: RobotModel, commands: Commands, duration:
 def batch_on_two_processes(
     model: RobotModel, commands: Commands, duration: float, rollouts: int, repeats: int, seed: int
 ) -> Figure:
-    """Rollouts of the walk, each at an amplitude of its own; wall time."""
+    """Wall time of rollouts of the walk, each with a different amplitude."""
     config = SimulationConfig(engine="drake")
     amplitudes = np.random.default_rng(seed).uniform(0.8, 1.0, rollouts)
     jobs = [Job(model, config, replace(commands, goals=a * commands.goals), duration, LEAD) for a in amplitudes]

@@ -1,4 +1,4 @@
-"""The station against MuJoCo on the same robot at the same joint error."""
+"""Speed of the station over MuJoCo's, on the same robot and at equal joint error."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
 
 STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 8e-3)
+"""MuJoCo's time steps that are tried [s]."""
 
 
 def station_against_mujoco(
     model: RobotModel, commands: Commands, duration: float, exact: Take, finest: float, step: float, repeats: int
 ) -> Figure:
-    """Simulated time per processor time of the station at `step` over that of MuJoCo at its fastest step that errs no more.
+    """Real-time factor of the station at `step` over that of MuJoCo at its fastest step whose joint error is no larger.
 
-    Each errs against its own rollout at the step `finest` (`exact` is the station's). Beside it, where a step's time goes."""
+    The error of each engine is against its own rollout at the step `finest` (`exact` is the station's). The details break down
+    the time of a step."""
     base = exact.base
     name = f"station_against_mujoco_{base}_base"
     meaning = f"real-time factor of the station over MuJoCo's at the same joint error, base {base}; both with the full servo law"

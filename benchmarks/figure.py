@@ -1,4 +1,4 @@
-"""A measured figure beside what is required of it, and how it is measured: in turns, so that a busy machine slows both sides."""
+"""A measured figure with its requirement. The compared runs are timed in turns, so that a busy machine slows all of them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Figure:
-    """value: of what `meaning` says, the median over turns, quartiles beside it; None with the reason where it was `skipped`.
-    at_least, below: what is required of it, if anything is; aim: what is hoped for. details: what stands behind it."""
+    """meaning: the quantity in words. value, quartiles: its median and quartiles over the turns; None where the measurement was
+    skipped, and `skipped` gives the reason. at_least, below: the requirement, if there is one. aim: a goal beyond the
+    requirement. details: the measurements behind the value."""
 
     name: str
     meaning: str
@@ -35,7 +36,7 @@ class Figure:
         return (self.at_least is None or self.value >= self.at_least) and (self.below is None or self.value < self.below)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data; what does not apply is left out."""
+        """Plain data, without the fields that do not apply."""
         requirement = {"at_least": self.at_least, "below": self.below, "aim": self.aim}
         out = {"meaning": self.meaning, "value": self.value, "quartiles": self.quartiles and list(self.quartiles),
                "requirement": {k: v for k, v in requirement.items() if v is not None} or None, "met": self.met,
@@ -45,10 +46,10 @@ class Figure:
 
 def in_turns(runs: Mapping[str, Callable[[], object]], repeats: int, clock: Callable[[], float] = time.process_time,
              warm: bool = True) -> dict[str, Array]:
-    """Seconds (repeats,) that each run takes, one after the other in each turn; once before, untimed, to warm up.
+    """Seconds (repeats,) of each run, by its name. Every turn times all runs, one after the other.
 
-    clock: processor time of this process, which other processes disturb least, or time.perf_counter for work that is done
-    by several processes or threads.
+    clock: processor time of this process, which other processes disturb least, or time.perf_counter for work that several
+    processes or threads do. warm: makes one untimed turn first.
     """
     if warm:
         for run in runs.values():
@@ -63,6 +64,6 @@ def in_turns(runs: Mapping[str, Callable[[], object]], repeats: int, clock: Call
 
 
 def median_and_quartiles(ratios: Array) -> tuple[float, tuple[float, float]]:
-    """Of the ratios of all turns."""
+    """The median and the lower and upper quartile of one ratio per turn."""
     low, middle, high = (float(x) for x in np.percentile(ratios, [25, 50, 75]))
     return middle, (low, high)

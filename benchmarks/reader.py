@@ -1,4 +1,4 @@
-"""The Motive reader against pandas on the same file."""
+"""Time to read a Motive CSV, against pandas on the same file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RATE = 120.0
 
 
 def reader_against_pandas(frames: int, repeats: int, seed: int) -> Figure:
-    """Both read a generated export of the puppy's rigid bodies at 120 Hz; wall time, as both use threads."""
+    """Wall time, as both use threads, to read a generated export of the puppy's rigid bodies at 120 Hz."""
     with tempfile.TemporaryDirectory() as folder:
         path = _write_long_recording(Path(folder) / "long.csv", frames, seed)
 

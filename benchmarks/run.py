@@ -1,4 +1,4 @@
-"""All figures in one run, with the machine they were measured on."""
+"""Measures all figures in one run and describes the machine they were measured on."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ PACKAGES = ("drake", "mujoco", "numpy", "pandas", "pyarrow", "joblib", "numba")
 
 @dataclass(frozen=True)
 class Size:
-    """How much is measured: seconds of motion, turns, step [s] that counts as converged, frames, rollouts."""
+    """How much is measured. duration, walk: of the motion with the base held and of the walk [s]. turns: of each comparison.
+    finest: step whose motion counts as exact [s]. frames, readings: length of the Motive file, and how often it is read.
+    rollouts, batches: in a batch, and how many batches."""
 
     duration: float = 1.5
     walk: float = 0.5
@@ -39,11 +41,11 @@ class Size:
 
 
 QUICK = Size(duration=0.1, walk=0.1, turns=1, finest=5e-4, frames=2000, readings=1, rollouts=4, batches=1)
-"""To see that everything runs; the figures mean nothing."""
+"""Only checks that everything runs; the figures mean nothing."""
 
 
 LOG, LOG_QUICK, LOG_DIAGNOSED = 4.0, 0.3, 2.4
-"""Seconds of motion in the logs that are fitted, and in the one that is diagnosed."""
+"""Duration of the log that is fitted, also in the quick form, and of the one that is diagnosed [s]."""
 TURNS = 2
 MODELS, LOG_TURNS = 50, 5
 

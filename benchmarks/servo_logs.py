@@ -1,4 +1,4 @@
-"""Rollouts of one servo log for many models, as fits of servo logs request them, against MuJoCo's."""
+"""Speed of rollouts of one servo log for many models, as a fit makes them, against MuJoCo's."""
 
 from __future__ import annotations
 

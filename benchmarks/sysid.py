@@ -1,4 +1,4 @@
-"""Two frictions of one joint, fitted by this library and by MuJoCo's toolbox to the same log."""
+"""Time to fit two frictions of one joint to a log, by this library and by MuJoCo's toolbox."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ NAME = "fit_against_mujoco_sysid"
 MEANING = ("wall seconds of this library's fit of two frictions of one joint over those of mujoco.sysid, at the same step, from "
            "the same log and the same nominal robot")
 FRICTION = SERVO["coulomb_friction"], SERVO["viscous_friction"]
-"""Nominal [N m, N m s/rad]."""
+"""Nominal Coulomb [N m] and viscous [N m s/rad] friction."""
 TRUTH = FRICTION[0] + EXTRA[0], FRICTION[1] + EXTRA[1]
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
-"""As `diagnose` fits."""
+"""Simulation settings with which `diagnose` fits."""
 
 
 @dataclass(frozen=True)
 class Ours:
-    """This library's fit. friction: Coulomb [N m] and viscous [N m s/rad]; residual: RMS [rad]; rollouts: how many were made."""
+    """This library's fit. friction: Coulomb [N m] and viscous [N m s/rad]. residual: RMS [rad]. rollouts: how many it took."""
 
     fit: Fit
     friction: tuple[float, float]
@@ -51,8 +51,8 @@ class Ours:
 
 
 def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iterations: int = SUBSETS.most_steps) -> Figure:
-    """duration: of the log [s], which MuJoCo makes in steps of TRUE_STEP, so that nothing of it is this library's own.
-    iterations: of our fit, at most."""
+    """duration: of the log [s]. The log is simulated by MuJoCo in steps of TRUE_STEP, so that nothing in it favours this library.
+    iterations: the most that this library's fit makes."""
     try:
         from studies.other_engine.sysid import Identification
     except ImportError as e:
@@ -105,15 +105,15 @@ def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iteration
         f"at_{1e3 * PROBLEM.time_step * PROBLEM.fine:g}_ms": {"ours": row(last) | {"wall_seconds_more": last_seconds},
                                          "mujoco_sysid": row(fine) | {"wall_seconds": fine_seconds}},
         "differs": f"the log is MuJoCo's at {1e3 * TRUE_STEP:g} ms. Ours: a damped Gauss-Newton with long differences and "
-                   "Broyden updates, few rollouts, each of a Drake station that is built anew; what its step is wrong by on the "
-                   "nominal robot, known from finer rollouts in the preparation, is taken off, and a lag of up to 2 ms is "
-                   "allowed. Theirs: fresh differences in each step, all in one call of C, on one thread here; no correction "
-                   "for the step, and each joint over its own RMS. Both count building of models."}
+                   "Broyden updates, few rollouts, each of a newly built Drake station; the error of its step on the nominal "
+                   "robot, known from finer rollouts in the preparation, is subtracted, and a lag of up to 2 ms is allowed. "
+                   "Theirs: new differences in each step, all in one call of C, on one thread here; the error of the step is "
+                   "not corrected, and each joint is weighted by its own RMS. Both times include building the models."}
     return Figure(NAME, MEANING, value, quartiles, details=details)
 
 
 def _evidence(mine: Session) -> list[TakeEvidence]:
-    """The log as `diagnose` weighs it, every frame to be fitted, as the other toolbox fits all."""
+    """The log as `diagnose` weights it, but with every frame used for the fit, as in MuJoCo's toolbox."""
     takes, _ = read_takes(mine)
     by_name = dict(zip((t.spec.name for t in takes), roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1)))
     registered, _ = register_takes(mine, takes, {name: r.nominal for name, r in by_name.items()})
@@ -122,7 +122,7 @@ def _evidence(mine: Session) -> list[TakeEvidence]:
 
 
 def _fitted(mine: Session, evidence: list[TakeEvidence], iterations: int) -> Ours:
-    """From nominal, all rollouts anew."""
+    """A fit from the nominal robot that reuses no earlier rollout."""
     evaluator = RolloutEvaluator(evidence, CONFIG, 1)
     search = Search(evaluator, mine.model)
     pool = {c.name: c for c in candidates(mine.model, evidence) if c.joint == ODD}
