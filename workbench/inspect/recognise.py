@@ -279,8 +279,8 @@ def _session(path: Path) -> Inspection:
     session = load_session(path)
     check = session_check(session)
     problems = [f"{of}: {text}" for of, lines in check.problems.items() for text in lines]
-    takes = {f"take '{t.name}'" for t in session.takes}
-    none_left = bool(takes) and takes <= set(map(str, check.damaged)) and not session.predict
+    takes = {t.name for t in session.takes}
+    none_left = bool(takes) and takes <= check.damaged_takes and not session.predict
     lost = check.refused or ("none of its takes can be used" if none_left else "")
     logged = _logged(session)
     return Inspection(

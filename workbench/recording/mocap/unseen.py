@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.mocap.tracks import Tracks
+from workbench.recording.runs import runs_of_true
 from workbench.types import Array
 
 _APART = 0.02
@@ -69,7 +70,7 @@ def _repeats(p: Array, q: Array) -> NDArray[np.bool_]:
     if same.any() and _noisy(p[seen][np.concatenate([[True], ~same])]):
         held[seen[1:][same]] = True
     elif same.any():
-        for first, last in np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2):
+        for first, last in runs_of_true(same):
             if last - first >= _RUN and _leaps(p[seen], last):
                 held[seen[first + 1:last + 1]] = True
     return held
@@ -108,6 +109,5 @@ def _last_digit(values: Array) -> float:
 
 def _longest(held: NDArray[np.bool_]) -> tuple[int, int]:
     """First frame and length of the longest run."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int))).reshape(-1, 2)
-    k = int(np.argmax(edges[:, 1] - edges[:, 0]))
-    return int(edges[k, 0]), int(edges[k, 1] - edges[k, 0])
+    first, end = max(runs_of_true(held), key=lambda run: run[1] - run[0])
+    return first, end - first

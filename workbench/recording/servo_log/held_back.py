@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.recording.runs import runs_of_true
 from workbench.recording.servo_log.following import JointLog
 from workbench.recording.servo_log.response import Response, fit_response, shapes
 
@@ -56,8 +57,7 @@ def _ends(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:
     for sign, which in ((1, "above"), (-1, "below")):
         value = float(np.max(sign * log.position)) * sign
         there = log.position == value
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int))).reshape(-1, 2)
-        visits = [(a, b) for a, b in edges if b - a >= c.rows
+        visits = [(a, b) for a, b in runs_of_true(there) if b - a >= c.rows
                   and np.rad2deg(np.max(sign * (log.goal[a:b] - value))) > c.beyond]
         rows = sum(b - a for a, b in visits)
         if len(visits) >= c.visits and rows > c.piles * len(there):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.recording.runs import runs_of_true
 from workbench.recording.servo_log.following import JointLog
 from workbench.recording.servo_log.response import Response, fit_response, shapes
 from workbench.types import Array, Mask
@@ -67,7 +68,7 @@ def _stretches(time: Array, position: Array, fit: Response, c: LetGoChecks) -> l
     away = np.abs(position - fit.predicted)
     near = np.flatnonzero(away < c.tight * fit.spread)
     out: list[tuple[int, int]] = []
-    for first, end in _runs(away > max(c.leaves * fit.spread, np.deg2rad(c.least))):
+    for first, end in runs_of_true(away > max(c.leaves * fit.spread, np.deg2rad(c.least))):
         before, after = near[near < first], near[near >= end]
         begin, stop = int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(time)
         if out and begin < out[-1][1]:
@@ -120,12 +121,6 @@ def _follows(shaped: Array, log: JointLog, rest: Mask, c: LetGoChecks) -> bool:
     """Whether outside the stretches the joint does follow its goals."""
     fit = fit_response(shaped, log.position, rest)
     return fit.explained >= c.before and fit.gain >= c.firm
-
-
-def _runs(true: Mask) -> list[tuple[int, int]]:
-    """First index, and the one after the last, of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _goes_back(goal: Array, c: LetGoChecks) -> bool:

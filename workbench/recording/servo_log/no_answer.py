@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.recording.servo_log.repeats import runs_of_equals
+from workbench.recording.runs import runs_of_equals
 from workbench.types import Array
 
 
@@ -34,7 +34,7 @@ def without_no_answer(time: Array, position: Array, c: NoAnswerChecks = NO_ANSWE
         return position, []
     values = position[seen]
     steps = np.abs(np.diff(values))
-    runs = [(a, b) for a, b in runs_of_equals(values) if a > 0 and b + 1 < len(values) and b - a >= 1]
+    runs = [(a, b) for a, b in runs_of_equals(values) if a > 0 and b + 1 < len(values)]
     in_runs = np.zeros(len(steps), dtype=bool)
     for a, b in runs:
         in_runs[a - 1:b + 1] = True  # the leaps are not to be measured by themselves

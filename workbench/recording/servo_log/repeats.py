@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.recording.runs import runs_of_equals
 from workbench.types import Array
 
 
@@ -59,12 +60,6 @@ def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> 
     return out, [f"repeats the same reading for {lasts} rows while the joint moves, in {len(found)} stretches, the first from "
                  f"{time[seen[found[0][0]]]:.3f} s (row {seen[found[0][0]] + 1}): as a reader does when the bus times out; "
                  f"{rows} repeated reading(s) taken out"]
-
-
-def runs_of_equals(values: Array) -> list[tuple[int, int]]:
-    """First and last index of each run of equal values."""
-    same = np.concatenate([[False], values[1:] == values[:-1], [False]])
-    return [(int(a), int(b)) for a, b in np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2)]
 
 
 def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChecks) -> bool:
