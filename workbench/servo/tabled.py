@@ -37,14 +37,7 @@ class Tabled(ServoTerm):
         kind = self.depends_on[t]
         x = angle if kind in (ANGLE, ANGLE_DIRECTION) else duty
         x = abs(duty) if kind == DUTY_DIRECTION else velocity if kind == SPEED else x
-        k = int(np.searchsorted(self.at[t], x, side="right"))
-        if k == 0:
-            value = self.by[t, 0]
-        elif k == len(self.at[t]):
-            value = self.by[t, -1]
-        else:
-            share = (x - self.at[t, k - 1]) / (self.at[t, k] - self.at[t, k - 1])
-            value = self.by[t, k - 1] + share * (self.by[t, k] - self.by[t, k - 1])
+        value = np.interp(x, self.at[t], self.by[t])
         if kind in (ANGLE_DIRECTION, DUTY_DIRECTION):
             value *= velocity / np.sqrt(velocity * velocity + TURNING * TURNING)
         return float(value)

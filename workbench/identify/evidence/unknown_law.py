@@ -227,23 +227,20 @@ def _as_fit(region: Region, options: EvidenceOptions, at: _State) -> Fitted:
 def _predicted(region: Region, options: EvidenceOptions, at: _State) -> _Predicted:
     """The most probable groups (at least one) and scales of a law together with a state's effects, by linear algebra. Groups are
     added one by one while that pays, each at its best scale given the others."""
-    best, chosen = _solved(region, options, at, {}), dict[str, float]()
+    best, chosen = None, dict[str, float]()
     scales = [share * at.law.full_torque for share in options.law.shares]
-    first: _Predicted | None = None
-    while True:
-        tries = [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s})
-                 for g in at.law.groups if g not in chosen for s in scales]
-        if not tries:
-            break
+    while tries := [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s})
+                    for g in at.law.groups if g not in chosen for s in scales]:
         p, with_it = max(tries, key=lambda t: t[0].log_posterior)
-        if first is not None and p.log_posterior <= best.log_posterior:
+        if best is not None and p.log_posterior <= best.log_posterior:
             break
-        first, best, chosen = first or p, p, with_it
+        best, chosen = p, with_it
         for g in [*chosen][:-1]:  # what an earlier one needs is another size now
             again = [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s}) for s in scales if s != chosen[g]]
             other, those = max(again, key=lambda t: t[0].log_posterior)
             if other.log_posterior > best.log_posterior:
                 best, chosen = other, those
+    assert best is not None
     return best
 
 
