@@ -11,7 +11,8 @@ import pytest
 from tests.command import main
 from tests.inputs.corpus import ROBOT
 from workbench.dynamics.machine import Machine
-from workbench.dynamics.torque_log import TorqueLog, is_torque_log, read_torque_log, torque_gap
+from workbench.dynamics.torque_gap import torque_gap
+from workbench.dynamics.torque_log import TorqueLog, is_torque_log, read_torque_log
 from workbench.dynamics.trajectory import smoothed
 from workbench.files import InputError
 from workbench.robot import EffectSpec, RobotModel

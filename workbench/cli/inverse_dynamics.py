@@ -20,8 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "base is first simulated with ideal joints, since the motion alone does not determine how the body moves.",
     )
     parser.add_argument("input", metavar="INPUT", help="a motion, a rollout, a recording, a log of angles and torques without "
-                        "goals, or a session.yaml with "
-                        "--take")
+                        "goals, or a session.yaml with --take")
     parser.add_argument("--take", metavar="NAME", help="take of the session")
     parser.add_argument("--motion", metavar="FILE", help="motion played in the recording, if the recording does not name it")
     add_model(parser, "the bundled puppy; with --take the session's own")
@@ -72,7 +71,8 @@ def _torque_log(args: argparse.Namespace) -> int:
     """The torque gap of a log that holds torques and no goals, on a base that is held."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.dynamics.torque_log import read_torque_log, summary, torque_gap
+    from workbench.dynamics.torque_gap import summary, torque_gap
+    from workbench.dynamics.torque_log import read_torque_log
     from workbench.files.reading import write_whole
 
     model = load_model(args.model, args.packages)

@@ -22,6 +22,8 @@ _FEWEST = 3
 """Markers that a rigid body has at least."""
 _THIN = 0.05
 """A body whose markers lie on a line, to this share of its length, has no rotation about it."""
+_SLOWEST, _FARTHEST = 0.5, 20.0
+"""Frames further apart [s], and places further from each other [m], are not of a small robot in a room."""
 
 
 @dataclass(frozen=True)
@@ -51,28 +53,27 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
     if capture.up == "z":
         bodies = {name: BodyTrack(_y_up(b.p), np.concatenate([b.quat[:, :1], _y_up(b.quat[:, 1:])], axis=1))
                   for name, b in bodies.items()}
-    problems = [*capture.problems, *doubts(capture)]
+    problems = [*capture.problems, *_doubts(capture)]
     if not bodies and markers:
         bodies = bodies_of_markers(markers)
         if bodies:
-            problems.append(f"rigid bodies are formed of markers with a common name: {', '.join(bodies)}; each is taken "
-                            f"to be "
+            problems.append(f"rigid bodies are formed of markers with a common name: {', '.join(bodies)}; each is taken to be "
                             "upright, without a rotation, in the first frame that shows all its markers")
     return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=np.arange(len(time)),
                      rate=rate_of(time), units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems),
                      sensing="mocap")
 
 
-def doubts(capture: Capture, slowest: float = 0.5, farthest: float = 20.0) -> list[str]:
-    """What in a capture contradicts a small robot in a room: frames further apart than `slowest` [s], places further from each
-    other than `farthest` [m], and quaternions whose scalar comes last."""
+def _doubts(capture: Capture) -> list[str]:
+    """Contradictions of a small robot in a room: frames too far apart in time, places too far from each other, and quaternions
+    whose scalar comes last."""
     out = []
     apart = float(np.median(np.diff(capture.time)))
-    if apart > slowest:
+    if apart > _SLOWEST:
         out.append(f"time: frames are {apart:g} apart: are the times frame numbers or milliseconds? (seconds are expected)")
     seen = [p[np.isfinite(p).all(axis=1)] for p in (*(p for p, _ in capture.bodies.values()), *capture.markers.values())]
     places = np.concatenate([p for p in seen if len(p)]) if any(map(len, seen)) else np.zeros((1, 3))
-    if (size := float(np.ptp(places, axis=0).max())) > farthest:
+    if (size := float(np.ptp(places, axis=0).max())) > _FARTHEST:
         out.append(f"places lie up to {size:.4g} m apart: are they in millimetres? (metres are expected, or columns BODY.x_mm)")
     first = [q[np.isfinite(q).all(axis=1)][:1] for _, q in capture.bodies.values()]
     turned = [abs(float(q[0, 3])) > 0.97 for q in first if len(q)]

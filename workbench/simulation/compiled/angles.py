@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from workbench.simulation.job import Job
 from workbench.simulation.steady import JointStates
 from workbench.types import Array
 
+T = TypeVar("T")
 KEPT = 256
 """Schedules of commands, and ways to read a log, that are kept, as a session's takes are played again and again."""
 
@@ -32,8 +33,8 @@ class _Reading(NamedTuple):
     put: list[tuple[Ints, Array, Array]]
 
 
-_schedules: OrderedDict[Any, tuple[object, Any]] = OrderedDict()
-_readings: OrderedDict[Any, tuple[object, Any]] = OrderedDict()
+_schedules: OrderedDict[Any, tuple[object, Schedule]] = OrderedDict()
+_readings: OrderedDict[Any, tuple[object, _Reading]] = OrderedDict()
 
 
 def servo_angles(jobs: Sequence[Job]) -> list[Array]:
@@ -74,7 +75,7 @@ def _reading(compiled: CompiledJob, rows: int) -> _Reading:
         put = [] if job.restarts is None else _after_restarts(times, time, job.restarts)
         return _Reading(row, following, share, (times < time[0]) | (times > time[-1]), put)
 
-    return _kept(_readings, (rows, every, lead, times.tobytes(), id(job.restarts)), job.restarts, made)  # type: ignore[no-any-return]
+    return _kept(_readings, (rows, every, lead, times.tobytes(), id(job.restarts)), job.restarts, made)
 
 
 def _after_restarts(times: Array, time: Array, restarts: JointStates) -> list[tuple[Ints, Array, Array]]:
@@ -100,10 +101,10 @@ def _schedule(compiled: CompiledJob) -> Schedule:
         return made()
     key = (id(job.commands), *vars(config).values(), compiled.model.joints, plan.lead, plan.duration, job.elapsed,
            id(job.restarts))
-    return _kept(_schedules, key, (job.commands, job.restarts), made)  # type: ignore[no-any-return]
+    return _kept(_schedules, key, (job.commands, job.restarts), made)
 
 
-def _kept(known: OrderedDict[Any, tuple[object, Any]], key: object, of: object, made: Callable[[], Any]) -> Any:
+def _kept(known: OrderedDict[Any, tuple[object, T]], key: object, of: object, made: Callable[[], T]) -> T:
     """The value under a key, made at the first call. of: objects whose ids are in the key; held, so that these stay theirs."""
     found = known.get(key)
     if found is None:

@@ -15,7 +15,7 @@ from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia
 from workbench.robot import RobotModel
 from workbench.simulation.compiled.sdf_structure import Split, split
-from workbench.simulation.compiled.tables import Array, Tables, carried, read_tables, weigh
+from workbench.simulation.compiled.tables import Tables, carried, read_tables, weigh
 
 KEPT = 64
 ENDLESS = 1e15
@@ -75,11 +75,9 @@ def _written(tables: Tables, first: Split, parts: Split) -> Tables | None:
         about = RotationalInertia(*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
         M = SpatialInertia.MakeFromCentralInertia(mass, com, about)
         links[k] = replace(links[k], M=carried(M, links[k].X))
-    weights: dict[str, Array] = {}
-    if moved:
-        weights = dict(zip(("mass", "com", "inertia"), weigh(links, len(tables.joints))))
-    if not all((np.abs(columns[name][changed]) < ENDLESS).all() for name in columns
-               if (changed := columns[name] != getattr(tree, name)).any()):
+    if not all((np.abs(column[column != getattr(tree, name)]) < ENDLESS).all() for name, column in columns.items()):
         return None
-    changed_columns: dict[str, Any] = {**columns, **weights}
-    return replace(tables, tree=tree._replace(**changed_columns), links=tuple(links))
+    numbers: dict[str, Any] = dict(columns)
+    if moved:
+        numbers |= zip(("mass", "com", "inertia"), weigh(links, len(tables.joints)))
+    return replace(tables, tree=tree._replace(**numbers), links=tuple(links))
