@@ -23,7 +23,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from studies.common import publish, run_study, sign
-from studies.concealed_effects.catalogue import TIES, draw, possible
+from studies.concealed_effects.catalogue import draw, possible
+from studies.concealed_effects.conceal import separable
 from studies.concealed_effects.robots import puppy
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import filmed_takes
@@ -108,7 +109,7 @@ def robot(vault: Vault, k: int, folder: Path) -> RobotModel:
         model, takes = made.model(folder), [t for t in filmed_takes(rng) if not t.predict]
         names = rng.permutation(possible(made, False))[:2]
         effects = tuple(draw(str(n), rng, made).at(float(rng.uniform())) for n in names)
-        if frozenset(e.effect for e in effects) in TIES or set(effects[0].where) & set(effects[1].where):
+        if not separable(effects[0], effects[1:]):
             continue
         shutil.rmtree(folder, ignore_errors=True)
         played = write_recordings(folder, model, replace(model, effects=effects), takes, random_camera(rng), rng)

@@ -137,7 +137,7 @@ def _visible(bench: Bench, name: str, beside: Sequence[EffectSpec], rng: np.rand
     for _ in range(TRIES):
         drawn = draw(name, rng, bench.robot)
         spec = drawn.at(float(rng.uniform()))
-        if _apart(spec, beside):
+        if separable(spec, beside):
             try:
                 if bench.shows(spec) > SHOWS:
                     return drawn, spec
@@ -146,8 +146,9 @@ def _visible(bench: Bench, name: str, beside: Sequence[EffectSpec], rng: np.rand
     raise NoneFoundError(f"{name}: shows nowhere")
 
 
-def _apart(spec: EffectSpec, beside: Sequence[EffectSpec]) -> bool:
-    """Not two effects in one joint (what play does inside a stop, nobody has defined), and not two that nothing can separate."""
+def separable(spec: EffectSpec, beside: Sequence[EffectSpec]) -> bool:
+    """Whether an effect can be hidden with others: none of them is at the same joint (play inside a stop, say, is not defined),
+    and it forms no pair with one of them that nothing can separate."""
     taken = {_joint(w) for e in beside for w in e.where}
     if any(frozenset((spec.effect, e.effect)) in TIES for e in beside):
         return False
@@ -167,7 +168,7 @@ def _mask(bench: Bench, chosen: Sequence[EffectSpec], name: str, rng: np.random.
     others = [str(n) for n in rng.permutation(PULLS)]
     for candidate in dict.fromkeys([name, *others]):
         drawn = draw(candidate, rng, bench.robot)
-        if not _apart(drawn.at(0.5), chosen):
+        if not separable(drawn.at(0.5), chosen):
             continue
         spec = _sized(bench, chosen, drawn, nominal, missed)
         if spec is not None:
