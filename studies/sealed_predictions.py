@@ -4,8 +4,8 @@
 
 Each robot is a puppy in MuJoCo with two hidden effects, drawn from the system's seed and sealed. One session (stand, sway,
 walk) is recorded and diagnosed. The diagnosed and the nominal model then predict speed and turning of ten gaits; the SHA-256 of
-these predictions is written and printed before any of the gaits is played in MuJoCo. A study that was stopped resumes
-with the next robot.
+these predictions is written down before any of the gaits is played in MuJoCo. A study that was stopped resumes with the robot
+that it was at.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import json
 import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from studies.other_engine.as_take import mujoco_take
 from studies.other_engine.make_session import random_camera, write_recordings
 from studies.other_engine.player import Rollout
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.machine import GaitMachine
@@ -101,8 +102,8 @@ def predicted(model: RobotModel, motions: Mapping[str, Played]) -> dict[str, Wen
 
 
 def robot(vault: Vault, k: int, folder: Path) -> RobotModel:
-    """Draws the k-th robot, one that stays upright, writes its session into `folder`, and seals its effects. Returns the nominal
-    model."""
+    """Draws the k-th robot, one that stays upright, writes its session into `folder`, and seals its effects where a run that was
+    stopped has not: the same seed draws the same robot. Returns the nominal model."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([vault.seed, k, attempt])
         made = puppy(rng)
@@ -114,8 +115,8 @@ def robot(vault: Vault, k: int, folder: Path) -> RobotModel:
         shutil.rmtree(folder, ignore_errors=True)
         played = write_recordings(folder, model, replace(model, effects=effects), takes, random_camera(rng), rng)
         if all(_upright(run) for _, run, _, _ in played):
-            told = json.dumps([{"effect": e.effect, "where": list(e.where), "parameters": dict(e.parameters)} for e in effects])
-            vault.seal(folder.name, {"effects.json": told})
+            if not vault.holds(folder.name):
+                vault.seal(folder.name, {"effects.json": json.dumps([asdict(e) for e in effects])})
             return model
     raise RuntimeError(f"robot {k + 1}: none of {TRIES} draws stays upright")
 
@@ -135,8 +136,11 @@ def hidden_robot(vault: Vault, name: str, model: RobotModel) -> RobotModel:
 
 
 def errors(said: Mapping[str, Went], true: Mapping[str, Went]) -> dict[str, float]:
-    """Median relative error of speed, median error of turning [deg/s], and rank correlation of the speeds."""
+    """Median relative error of speed, median error of turning [deg/s], and rank correlation of the speeds, over the gaits in
+    which the robot did not fall; NaN where there are too few."""
     names = [n for n in true if not true[n].fell]
+    if not names:
+        return dict.fromkeys(("speed", "turning deg/s", "rank"), math.nan)
     speeds = [abs(said[n].speed - true[n].speed) / max(true[n].speed, SLOWEST) for n in names]
     rank = spearmanr([said[n].speed for n in names], [true[n].speed for n in names]).statistic if len(names) > 2 else math.nan
     return {"speed": float(np.median(speeds)), "turning deg/s": float(np.median([abs(said[n].turning - true[n].turning)
@@ -175,7 +179,11 @@ def one(vault: Vault, k: int, out: Path, count: int, tell: Callable[[str], None]
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
     """Robot by robot; the page is written after each, so that a study that was stopped has one."""
     count, motions = (1, 3) if quick else (ROBOTS, len(MOTIONS))
-    vault, rows, said = Vault(out / "sealed", count, 58 if quick else None), list[dict[str, Any]](), ""
+    try:
+        vault = Vault(out / "sealed", count, 58 if quick else None)
+    except ValueError as e:
+        raise InputError(None, str(e)) from None
+    rows, said = list[dict[str, Any]](), ""
     for k in range(count):
         rows.append(one(vault, k, out, motions, lambda what, k=k: progress(what, k / count)))  # type: ignore[misc]
         model = load_session(out / "sessions/robot01/session.yaml").model
@@ -185,7 +193,9 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
 
 def _report(model: RobotModel, rows: Sequence[Mapping[str, Any]], vault: Vault) -> Report:
     better = sum(r["diagnosed"]["speed"] <= 0.5 * r["nominal"]["speed"] for r in rows)
-    summary = (f"{len(rows)} of {vault.count} robots. Diagnosed model: median error of speed "
+    fell = sum(math.isnan(r["nominal"]["speed"]) for r in rows)
+    summary = (f"{len(rows)} of {vault.count} robots, {fell} of which fell in every gait and have no error. "
+               "Diagnosed model: median error of speed "
                f"{100 * _median(rows, 'diagnosed', 'speed'):.0f} %, rank correlation {_median(rows, 'diagnosed', 'rank'):.2f}; "
                "nominal: "
                f"{100 * _median(rows, 'nominal', 'speed'):.0f} %, {_median(rows, 'nominal', 'rank'):.2f}. On {better} robots the "
@@ -201,7 +211,9 @@ def _report(model: RobotModel, rows: Sequence[Mapping[str, Any]], vault: Vault) 
 
 
 def _median(rows: Sequence[Mapping[str, Any]], who: str, what: str) -> float:
-    return float(np.median([r[who][what] for r in rows]))
+    """Over the robots that have a value."""
+    known = [r[who][what] for r in rows if math.isfinite(r[who][what])]
+    return float(np.median(known)) if known else math.nan
 
 
 def _pair(r: Mapping[str, Any], what: str, factor: float = 1.0, digits: int = 1) -> str:

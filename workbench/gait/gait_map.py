@@ -1,7 +1,6 @@
 """A map of gaits over speed and turning: in each cell the gait whose motion differs least from robot to robot.
 
-Needs the extra [map] (pyribs). One generation of gaits on one robot is one joblib task: inside
-`joblib.parallel_config(backend="dask")` the tasks run on the client's cluster.
+Needs the extra [map] (pyribs). Inside `joblib.parallel_config(backend="dask")` the rollouts run on the client's cluster.
 """
 
 from __future__ import annotations
@@ -28,15 +27,14 @@ from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, space_of
 from workbench.gait.table import GaitTable, paths_of, table_of
-from workbench.motion import Commands
+from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig
 from workbench.types import Array, Progress, no_progress
 
-Task = tuple[Commands, float, float]
-"""Commands, when the first full cycle ends [s], and the period [s]."""
 Motion = tuple[float, float] | None
 """Forward speed [m/s] and turning [rad/s]; None where the robot fell or touched the floor with something other than a foot."""
+CONFIG = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
 
 
 @dataclass(frozen=True)
@@ -132,7 +130,8 @@ def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0
 
 class _Search:
     def __init__(self, machine: GaitMachine, options: MapOptions, n_jobs: int) -> None:
-        self.machine, self.options, self.n_jobs, self.rollouts = machine, options, n_jobs, 0
+        self.machine, self.options, self.rollouts = machine, options, 0
+        self._rollouts = Rollouts(n_jobs)
         space = space_of(machine, Request())
         self.space: Space = replace(space, low=_with(space, "turn", -options.turn), high=_with(space, "turn", options.turn))
 
@@ -193,15 +192,12 @@ class _Search:
         return out
 
     def played(self, tables: Sequence[GaitTable], robots: Sequence[RobotModel]) -> list[list[Motion]]:
-        """Motions of every table on every robot, a task for each robot."""
-        from joblib import Parallel, delayed
-
-        tasks = []
-        for t in tables:
-            cycles = max(2, math.ceil(self.options.seconds / t.period)) + 1
-            tasks.append((t.commands(cycles), t.start_seconds + t.period, t.period))
-        self.rollouts += len(tasks) * len(robots)
-        return list(Parallel(n_jobs=self.n_jobs, prefer="threads")(delayed(walked)(robot, tasks) for robot in robots))
+        """Motions of every table on every robot, robot by robot."""
+        commands = [t.commands(max(2, math.ceil(self.options.seconds / t.period)) + 1) for t in tables]
+        jobs = [Job(robot, CONFIG, c, c.end) for robot in robots for c in commands]
+        self.rollouts += len(jobs)
+        takes = self._rollouts.takes(jobs, as_seen=False)
+        return [[motion(next(takes), robot, t) for t in tables] for robot in robots]
 
     def tried(self, found: Sequence[Cell], fresh: Sequence[RobotModel]) -> tuple[Cell, ...]:
         """The cells with what fresh robots did."""
@@ -222,15 +218,12 @@ WORST = -1e3
 """Objective of a gait that falls or breaks a limit, far below any spread."""
 
 
-def walked(robot: RobotModel, tasks: Sequence[Task]) -> list[Motion]:
-    """One robot's motion under each of the commands: one task of a cluster."""
-    config = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
-    jobs = [Job(robot, config, commands, commands.end) for commands, _, _ in tasks]
-    out: list[Motion] = []
-    for take, (_, begin, period) in zip(Rollouts(n_jobs=1).takes(jobs, as_seen=False), tasks):
-        m = None if take is None else measure(take, robot, begin, period, electrical=False)
-        out.append(None if m is None or m.fell else (float(m.velocity[0]), float(m.turn_rate)))
-    return out
+def motion(take: Take | None, robot: RobotModel, table: GaitTable) -> Motion:
+    """A robot's motion in a take of the table, after the first full cycle."""
+    if take is None:
+        return None
+    m = measure(take, robot, table.start_seconds + table.period, table.period, electrical=False)
+    return None if m.fell else (float(m.velocity[0]), float(m.turn_rate))
 
 
 def _with(space: Space, name: str, value: float) -> Array:
