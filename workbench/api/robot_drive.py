@@ -61,13 +61,11 @@ def drive_on_robot(port: Any, model: RobotModel, family: GaitFamily, path: WayPa
         warnings.append(f"{walk.late} tables came too late; the cycle before was repeated")
     if virtual is not None and virtual.body.let_go is not None:
         driven = replace(driven, take=virtual.body.take(walk.first_pose - virtual.body.let_go / SECOND))
-    log: Path | None = folder / "driven_joints.csv"
+    log: Path | None = None
     try:
-        assert log is not None
         joints = sorted(model.joints)
         servos = [JointServo(family_of(model), model.mountings.get(joint, Mounting())) for joint in joints]
-        write_telemetry(log, walk.rounds(), joints, servos)
+        log = write_telemetry(folder / "driven_joints.csv", walk.rounds(), joints, servos)
     except InputError as e:
         warnings.append(str(e))
-        log = None
     return RobotDrive(driven, walk.late, log, tuple(warnings))
