@@ -13,12 +13,14 @@ from workbench.device.virtual.clock import SECOND
 from workbench.files import InputError
 from workbench.gait.drive.controller import CycleController
 from workbench.gait.drive.family import GaitFamily
-from workbench.gait.drive.loop import END, FELL, Driven, Progress, Watch, drive
+from workbench.gait.drive.loop import FELL, Driven, Progress, Watch, drive
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.robot_walk import ControllerWalk, PoseSource, RobotWalkOptions
 from workbench.robot import RobotModel
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.simulation.virtual_robot import VirtualRobot
+
+ARRIVED = ("end of the path",)
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class RobotDrive:
     @property
     def arrived(self) -> bool:
         """Whether it walked to the end of its path."""
-        return self.driven.reason == END
+        return self.driven.reason in ARRIVED
 
 
 def drive_on_robot(port: Any, model: RobotModel, family: GaitFamily, path: WayPath, controller: CycleController,
@@ -54,12 +56,12 @@ def drive_on_robot(port: Any, model: RobotModel, family: GaitFamily, path: WayPa
         gently = driven.reason != FELL
     finally:
         walk.release(gently)
-    warnings = [] if driven.reason == END else [f"stopped: {driven.reason}"]
+    warnings = [] if driven.reason in ARRIVED else [f"stopped: {driven.reason}"]
     if walk.late:
         warnings.append(f"{walk.late} tables came too late; the cycle before was repeated")
     if virtual is not None and virtual.body.let_go is not None:
         driven = replace(driven, take=virtual.body.take(walk.first_pose - virtual.body.let_go / SECOND))
-    log = None
+    log: Path | None = None
     try:
         joints = sorted(model.joints)
         servos = [JointServo(family_of(model), model.mountings.get(joint, Mounting())) for joint in joints]
