@@ -96,9 +96,9 @@ def test_quiet_recordings_name_nothing(seed):
 def test_effects_that_do_the_same_share_the_probability():
     rollouts = robot({"backlash": 1.5})
     does = dict(rollouts.does)
-    does["viscous_friction.coefficient"] = does["backlash.gap"]
+    does["parallel_spring.stiffness"] = does["backlash.gap"]
     _, _, p = searched(replace(rollouts, does=does))
-    names = {("backlash", ("j",)), ("viscous_friction", ("j",))}
+    names = {("backlash", ("j",)), ("parallel_spring", ("j",))}
     either = sum(w for f, w in p.weights if {(c.name, c.where) for c in f.hypothesis.effects} & names)
     both = [p.named.get(name, 0.0) for name in sorted(names)]
     assert either == pytest.approx(1.0, abs=0.1)

@@ -72,7 +72,7 @@ def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
     said = gravity_over_torque(here, since, posterior_of([fit, *fits], since), fits)
     assert said.ratio.value == pytest.approx(1.3, rel=0.02)
     assert said.ratio.low < 1.3 < said.ratio.high
-    assert said.confidence > 0.6
+    assert said.confidence > 0.8
     assert best.log_posterior > fit.log_posterior
     assert "--model" not in said.said()
 

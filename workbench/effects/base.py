@@ -109,8 +109,6 @@ class Effect:
     """The effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
     """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
-    rarity: ClassVar[float] = 0.0
-    """Penalty in its prior log probability, compared with other effects [nats]."""
     needs_steady_load: ClassVar[bool] = False
     """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from workbench.effects.base import Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
@@ -19,7 +17,6 @@ class ParallelSpring(Effect):
     layer = "structure"
     places = ("joint",)
     tied = "gravity against torque"
-    rarity = math.log(10.0)  # somebody has to have mounted it; anything else on a robot changes by itself
     parameters = (Parameter("stiffness", "N m/rad", 0.0, 20.0, 0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:

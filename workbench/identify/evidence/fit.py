@@ -83,7 +83,7 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
         density, precision = density + h.law.log_prior, np.concatenate([precision, h.law.precision])
         slopes, parts = np.hstack([J, beside]), parts + len(h.law.scales)
     log, s = region.likelihood.evidence(r, slopes, density, precision)
-    odds = parts * log_odds(len(region.candidates), options.expected) - sum(c.effect.rarity for c in h.effects)
+    odds = parts * log_odds(len(region.candidates), options.expected)
     return Fitted(h, r, J, s, log, odds, beside=beside)
 
 
