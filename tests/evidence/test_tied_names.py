@@ -87,20 +87,22 @@ def test_names_that_fits_do_not_separate_share_the_ties_probability():
 
     ratio = Estimate(1.3, 1.2, 1.4, "1")
     names = (named("parallel_spring", 0.0), named("payload", 3.0), named("com_shift", 9.0))
-    told = GravityOverTorque((JOINT,), ratio, 0.96, names, True)
-    shared = shared_by_tie(finding("parallel_spring"), told, OPTIONS)
+    told = GravityOverTorque((JOINT,), ratio, 0.96, names, True, OPTIONS.occam)
+    shared = shared_by_tie(finding("parallel_spring"), told)
     assert shared.confidence == pytest.approx(0.48)
-    assert shared.tie == Alternative("payload", (JOINT,), 0.48)
-    assert shared.together == pytest.approx(0.96)
+    assert shared.alternatives == (Alternative("payload", (JOINT,), 0.48),)
+    assert shared.to_json()["confidence"] == pytest.approx(0.48)
+    assert shared.of_tie == pytest.approx(0.96)
+    assert shared.likely
     for alone in (finding("backlash"), finding("com_shift")):
-        assert shared_by_tie(alone, told, OPTIONS) == alone
-    assert shared_by_tie(finding("payload"), None, OPTIONS) == finding("payload")
+        assert shared_by_tie(alone, told) == alone
+    assert shared_by_tie(finding("payload"), None) == finding("payload")
 
 
 def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
     names = (TiedName("payload", ("arm",), {}, "arm carries 200 g more.", 0.0),
              TiedName("parallel_spring", (JOINT,), {}, "A spring pulls.", 40.0))
-    tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False)
+    tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False, OPTIONS.occam)
     assert "arm carries 200 g more" in tie.said()
     assert "spring" not in tie.said()
     assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]

@@ -116,7 +116,7 @@ class Explanation:
                     tuple(others[:1]),
                     c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
                     family=None if family is None else FamilyBelief(family, share * p.families[family]))
-                out.append(shared_by_tie(finding, ties.get(region.joints), self.options))
+                out.append(shared_by_tie(finding, ties.get(region.joints)))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
     def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:

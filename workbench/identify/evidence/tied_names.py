@@ -78,17 +78,18 @@ def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[li
     return sorted(within, key=lambda g: -g.log_evidence)
 
 
-def shared_by_tie(f: Finding, told: GravityOverTorque | None, options: EvidenceOptions) -> Finding:
-    """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with the tie's
-    probability shared among all of them."""
+def shared_by_tie(f: Finding, told: GravityOverTorque | None) -> Finding:
+    """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with its share
+    of the tie's probability, which is divided equally among all of these."""
     if told is None:
         return f
-    near = [n for n in told.names if n.behind < options.occam]
+    near = told.competitive
     others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
     if not others or len(others) == len(near):
         return f
     each = min(f.confidence, told.confidence / len(near))
-    return replace(f, confidence=each, alternatives=(Alternative(others[0].effect, others[0].where, each),))
+    rival = Alternative(others[0].effect, others[0].where, each)
+    return replace(f, confidence=each, of_tie=told.confidence, alternatives=(rival,))
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:
@@ -118,4 +119,4 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
     share = min((t.share for t in ties if t is not None), default=1.0)
     there = sum(w for f, w in p.weights if any(c.effect.tied == GRAVITY for c in f.hypothesis.effects))
     return GravityOverTorque(region.joints, ratio.estimate(), min(1.0, CONCLUSIONS.surest * share * there), tuple(names),
-                             options.drift is not None)
+                             options.drift is not None, options.occam)
