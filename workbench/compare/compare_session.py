@@ -99,7 +99,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
     return out
 
 
-def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: Progress = no_progress, n_jobs: int = 2
+def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int = 2, progress: Progress = no_progress
                     ) -> list[Rollouts]:
     """As `roll_out`, but for the finer steps of runs of which the compiled station covers the nominal one and agrees with Drake:
     these are the compiled station's."""

@@ -20,7 +20,7 @@ from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
-from workbench.robot import GRAVITY, RobotModel
+from workbench.robot import RobotModel
 from workbench.types import Array
 
 Stance = Mapping[str, NDArray[np.bool_]]
@@ -57,17 +57,17 @@ class InverseDynamics:
 
     base: "free", feet on a level floor, or "fixed", held level (or as the SDF mounts it), or moved along a path. friction:
     of foot on ground; None: the model's ground, else the SDF's feet, else 0.5. servo_friction: whether the motor torque
-    includes the servo's own Coulomb and viscous friction. gravity [m/s²] in W. InputError for a base that the model lacks or
+    includes the servo's own Coulomb and viscous friction. InputError for a base that the model lacks or
     that cannot float.
     """
 
     def __init__(self, model: RobotModel, base: Literal["free", "fixed"] = "free", friction: float | None = None,
-                 servo_friction: bool = True, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:
+                 servo_friction: bool = True) -> None:
         if base not in ("free", "fixed"):
             raise InputError(None, f"base: expected free or fixed, got '{base}'")
         model.check_base(floating=base == "free")
         self.model, self.base, self.servo_friction = model, base, servo_friction
-        self.machine = Machine(model, gravity)
+        self.machine = Machine(model)
         self.friction = self._pair_friction(friction)
         self._servos = [model.servo(j) for j in model.joints]
 
@@ -84,14 +84,14 @@ class InverseDynamics:
         none = np.zeros((N, n))
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
-    def of_motion(self, motion: Motion, cycles: int | None = None, step: float = 1 / 240) -> InverseDynamicsResult:
-        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled every `step` s) on a fixed base.
+    def of_motion(self, motion: Motion, cycles: int | None = None) -> InverseDynamicsResult:
+        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
         if self.base != "fixed":
             raise InputError(motion.source, "a motion does not say how a free base moves; expected a take of it, ideal drive")
-        path = interpolate_motion(motion, motion.often(cycles), step)
+        path = interpolate_motion(motion, motion.often(cycles), 1 / 240)
         N = len(path.time)
         place, turn = np.tile(self.machine.mount[0], (N, 1)), np.tile(self.machine.mount[1], (N, 1))
         still = np.zeros((N, 6))
