@@ -78,7 +78,7 @@ class InverseDynamics:
         stance: foot -> (N,) bool, when feet are down; None: found from heights and speeds. floor: its height [m]; None: where the
         feet find it. InputError for a joint or foot that the model lacks.
         """
-        trajectory, problems = self._completed(trajectory)
+        trajectory, problems = self._complete(trajectory)
         solution = self._solve(trajectory, self._dearness(trajectory, stance, floor))
         N, n = trajectory.q.shape
         none = np.zeros((N, n))
@@ -132,7 +132,7 @@ class InverseDynamics:
         torque_left, speed_left = np.zeros_like(q), np.zeros_like(q)
         random = np.random.default_rng(0)
         for _ in range(draws):
-            turned = _turned(quat, _normal(random, np.full(p.shape, noise.rotation)))
+            turned = _rotate(quat, _normal(random, np.full(p.shape, noise.rotation)))
             moved = p + _normal(random, np.tile(noise.p, (len(take), 1)))
             noisy = smoothed(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
             other = self._solve(noisy, dear)
@@ -141,7 +141,7 @@ class InverseDynamics:
             for sum_, here, there in zip((torque_left, speed_left), margins, self._margins(other, noisy)):
                 sum_ += (there - here) ** 2 / draws
         pool = max(1, round(window / float(np.median(np.diff(take.time))))) if len(take) > 1 else 1
-        spreads = _Spreads(*(_pooled(variance, pool) for variance in (torque, residual, torque_left, speed_left)))
+        spreads = _Spreads(*(_pool(variance, pool) for variance in (torque, residual, torque_left, speed_left)))
         return self._result(take.name, trajectory, solution, spreads, problems)
 
     # ---- the equations -----------------------------------------------------------------------------------------------------
@@ -204,7 +204,7 @@ class InverseDynamics:
 
     # ---- what a take holds -------------------------------------------------------------------------------------------------
 
-    def _completed(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
+    def _complete(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
         """All joints in the model's order; those that the trajectory lacks at zero."""
         self._check_joints("trajectory", trajectory.joints)
         missing = [j for j in self.model.joints if j not in trajectory.joints]
@@ -273,12 +273,12 @@ def _normal(random: np.random.Generator, sigma: Array) -> Array:
     return np.asarray(random.standard_normal(sigma.shape) * np.nan_to_num(sigma))
 
 
-def _turned(quat: Array, rotation: Array) -> Array:
+def _rotate(quat: Array, rotation: Array) -> Array:
     """Quaternions wxyz (N, 4) turned by small rotation vectors (N, 3) [rad] in W."""
     return quat + quaternions.multiply(np.hstack([np.zeros((len(rotation), 1)), rotation / 2]), quat)
 
 
-def _pooled(variance: Array, samples: int) -> Array:
+def _pool(variance: Array, samples: int) -> Array:
     """Standard deviation from the mean variance of neighbouring samples; NaN where there is none."""
     seen = np.asarray(np.isfinite(variance).all(axis=1))
     count = uniform_filter1d(seen.astype(float), samples)
