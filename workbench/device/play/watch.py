@@ -32,9 +32,10 @@ class WatchOptions:
     """When a reading counts.
 
     confirm: how many readings, or unanswered questions, in a row of one servo. silent: how long it may go unheard [s], whether
-    it was asked or not. failures, share: so many unanswered questions within that time, and such a share of all, end a motion even
-    where a servo answered in between, as one does whose ID is doubled. cooler: how far below the limit at which it shuts itself down it has to stay [deg C], so that there is
-    torque left for the way to neutral. dead: share of the lowest voltage below which a ramp would only brown out again.
+    it was asked or not. failures, share: so many unanswered questions within that time, and such a share of all, end a motion
+    even where the servo answered in between, as one does whose ID is doubled. cooler: how far below the limit at which it shuts
+    itself down it has to stay [deg C], so that there is torque left for the way to neutral. dead: share of the lowest voltage
+    below which a ramp would only brown out again.
     """
 
     confirm: int = 2
@@ -54,8 +55,8 @@ SUDDEN = ("electrical shock", "current")
 
 
 class Watch:
-    """Judges readings as they come; the first that is confirmed is the reaction, and stays. doubted: a servo that ended the motion
-    because it did not answer as one servo does; what was read under its ID for `silent` before may be another's."""
+    """Judges readings as they come; the first that is confirmed is the reaction, and stays. doubted: a servo that ended the
+    motion because it did not answer as one servo does; what was read under its ID for `silent` before may be another's."""
 
     def __init__(self, profile: ServoProfile, joints: Mapping[int, str], limits: Mapping[int, int],
                  options: WatchOptions | None = None) -> None:
@@ -130,16 +131,19 @@ class Watch:
         self._count(servo, time, False)
 
     def _count(self, servo: int, time: float, answered: bool) -> None:
-        """Of its latest questions, whether too many had no answer; one that has fallen silent for good is left to `check`."""
+        """Whether too many of its latest questions had no answer. One that has fallen silent for good is left to `check`; one
+        that was silent and answers again has restarted, which its registers tell."""
         options, latest = self.options, self._questions[servo]
         latest.append((time, answered))
         while latest[0][0] <= time - options.silent:
             latest.popleft()
+        if answered:
+            return
         outcomes = [good for _, good in latest]
         failures = outcomes.count(False)
-        if failures < options.failures or failures < options.share * len(outcomes) or not any(outcomes[outcomes.index(False):]):
-            return
-        self._doubt(servo, UNSTEADY.format(len(outcomes) - failures, len(outcomes), options.silent))
+        unsteady = any(outcomes[outcomes.index(False):])
+        if unsteady and failures >= max(options.failures, options.share * len(outcomes)):
+            self._doubt(servo, UNSTEADY.format(len(outcomes) - failures, len(outcomes), options.silent))
 
     def check(self, time: float) -> None:
         """Whether every servo was heard not too long before a time [s]: silent where it was asked, unread where it was not."""
