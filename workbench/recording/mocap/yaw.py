@@ -41,8 +41,8 @@ class _Evidence:
     variance: float
 
 
-def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = (),
-                base: str = "free") -> YawEstimate:
+def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = ()
+                ) -> YawEstimate:
     """One yaw for all takes of a session, whose capture frame does not move (docs/formats.md, section 1).
 
     In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so what tells the
@@ -51,7 +51,7 @@ def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Se
     else the sign in which joints follow their commands.
     """
     tracks = [_prepared(r, model) for r in recordings if r.sensing == "mocap"]
-    return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))], base)
+    return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))])
 
 
 def _prepared(recording: Recording, model: RobotModel) -> Tracks:
