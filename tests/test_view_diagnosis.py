@@ -238,7 +238,7 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
         "No known effect is a likely explanation of the model's error; the closest candidate is ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
     assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
-    assert "no effect that the workbench knows explains how" in headline(replace(nothing, verdict="unexplained"))
+    assert "no known effect explains the difference" in headline(replace(nothing, verdict="unexplained"))
 
 
 def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, take: TakeRe
 def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     told = replace(diagnosis(model).findings[0], where=("flm", "flb"))
     assert title_of(told.effect, told.where).endswith("at flm or flb")
-    assert sentence_of(told).endswith("Or the same at flb: these recordings do not say.")
+    assert sentence_of(told).endswith("Or the same at flb: these recordings cannot tell.")
     assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
 
 

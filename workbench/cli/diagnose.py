@@ -80,7 +80,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
     for tied in diagnosis.tied:
-        print(f"  {tied.said()}")
+        print(f"  {tied.in_words()}")
     for unknown in diagnosis.unknown_torques:
         print(f"  {unknown_line(unknown)}")
     for sentence in hidden_effects(diagnosis.provenance.get("cannot_show", {})):

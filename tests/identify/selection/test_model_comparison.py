@@ -14,7 +14,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.proposals import candidates
 from workbench.identify.selection import calibration
-from workbench.identify.selection.calibration import calibrated
+from workbench.identify.selection.calibration import calibrate
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.model_comparison import NamePosterior, Rival, compare_models
 from workbench.identify.selection.odds import (
@@ -29,7 +29,7 @@ from workbench.identify.selection.odds import (
 from workbench.identify.selection.options import ODDS, SCHEDULING
 from workbench.identify.selection.record import SelectionResult, SelectionStep
 from workbench.identify.selection.rivals import replace_effect, rivals_near
-from workbench.identify.selection.screening import tried
+from workbench.identify.selection.screening import fit_groups
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
@@ -37,7 +37,7 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
     nominal = search.evaluated([])
     pool = [c for c in candidates(session.model, search.evaluator.evidence)
             if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
-    trials = [t for c in pool for t in tried(search, nominal, [[c]], {0: (0,)}, lambda share: None)]  # apart: none is given up
+    trials = [t for c in pool for t in fit_groups(search, nominal, [[c]], {0: (0,)}, lambda share: None)]
     trials.sort(key=lambda t: -t.gain["choose"])
     assert [t.candidate.name for t in trials] == ["coulomb_friction", "viscous_friction"]
     wrong = trials[1]
@@ -58,11 +58,11 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
     far = search.evaluated([(friction, 3.0 * right.x)])
     posteriors = [NamePosterior(0.9, (Rival(friction, right.x, 10.0, 0.08),))]
     floors = {0: np.zeros(len(search.evaluator.evidence[0].channels))}
-    assert calibrated(search, right, posteriors, floors) == posteriors
-    (less,) = calibrated(search, far, posteriors, floors)
+    assert calibrate(search, right, posteriors, floors) == posteriors
+    (less,) = calibrate(search, far, posteriors, floors)
     assert less.probability < 0.5
     assert less.rivals[0].probability == pytest.approx(0.08 / 0.9 * less.probability)
-    assert calibrated(search, far, posteriors, {0: 100 + floors[0]}) == posteriors  # all below the fit's own floor
+    assert calibrate(search, far, posteriors, {0: 100 + floors[0]}) == posteriors  # all below the fit's own floor
 
 
 @pytest.mark.parametrize(("ill", "sure"), [(("one",), 0.9), (("one", "three"), 0.36)])
@@ -73,7 +73,7 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
     e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, [e.channels.index(j) for j in ill]] = 4.0
-    standing = calibrated(
+    standing = calibrate(
         search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())], {0: np.zeros(len(e.channels))}
     )[0]
     assert standing.probability == pytest.approx(sure)
@@ -88,7 +88,7 @@ def test_what_a_joint_lacks_is_for_its_own_effect_to_answer(worn, monkeypatch):
     e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, e.channels.index("one")] = 7.0
-    told = calibrated(search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
+    told = calibrate(search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
     assert [t.probability for t in told] == pytest.approx([0.9, 0.18])
 
 
@@ -98,7 +98,7 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
     floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
     x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
     fit = replace(search.evaluated([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
-    (told,) = calibrated(search, fit, [NamePosterior(0.9, ())], {})
+    (told,) = calibrate(search, fit, [NamePosterior(0.9, ())], {})
     assert floor.values(x)[0] == pytest.approx(friction)
     assert told.probability == pytest.approx(sure)
 
@@ -108,7 +108,7 @@ def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
         fit = replace(search.evaluated([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
-        assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(sure)
+        assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(sure)
 
 
 def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_together(worn):
@@ -118,7 +118,7 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
 
     def told(c, x, deviations):
         fit = replace(search.evaluated([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))
-        return calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability
+        return calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability
 
     assert told(tilt, [0.1, 2.0], [0.5, 0.5]) == pytest.approx(0.9)
     assert told(tilt, [0.1, 0.9], [0.5, 0.5]) == pytest.approx(0.45)
@@ -136,7 +136,7 @@ def test_a_load_that_may_weigh_nothing_is_another_centre_of_mass_where_that_stan
     def told(deviations):
         fit = replace(search.evaluated([]), effects=(mass,), x=np.array([0.4, 3.0, 0.0, 1.0]),
                       covariance=np.diag(np.square(deviations)))
-        return calibrated(search, fit, [beside], {})[0].probability
+        return calibrate(search, fit, [beside], {})[0].probability
 
     assert told([0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.6)
     assert told([0.5, 4.0, 1.0, 2.0]) == pytest.approx(0.3)
@@ -251,8 +251,8 @@ def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):
     _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
-    assert calibrated(search, fit, [NamePosterior(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
-    assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.9)
+    assert calibrate(search, fit, [NamePosterior(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
+    assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize(("force", "down"), [((0.05, -0.05, -0.7), True), ((0.05, -0.05, 0.7), False), ((0.3, 0.0, -0.7), False)])
@@ -261,7 +261,7 @@ def test_a_pull_straight_down_is_no_cable(worn, force, down):
     _, search, _ = worn
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(tether,), x=tether.sizes(force), covariance=np.diag([1e-4] * 3))
-    assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
+    assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
     left = list(downward_pulls(fit))
     assert bool(left) is down
     for u in left:
@@ -276,7 +276,7 @@ def test_a_load_is_less_sure_where_a_pull_straight_down_is_about_as_likely(worn,
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
     beside = NamePosterior(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
-    assert calibrated(search, fit, [beside], {})[0].probability == pytest.approx(sure)
+    assert calibrate(search, fit, [beside], {})[0].probability == pytest.approx(sure)
 
 
 @pytest.mark.parametrize(("joint", "walks", "near"), [(None, True, ["com_shift(tail)"]), ("one", True, []), (None, False, [])])

@@ -67,7 +67,7 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     trials = [
         CandidateFit(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))
     ]
-    choices = forward._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
+    choices = forward._accept(sorted(trials, key=lambda t: -t.gain["choose"]))
     assert [[t.candidate.name for t in c] for c in choices] == [chosen]
 
 
@@ -81,7 +81,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
     trials = [CandidateFit(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
               for c, g, share in zip((soft, shifted), (565.0, gain), closed)]
-    assert [[t.candidate.name for t in c] for c in forward._accepted(trials)] == [[name] for name in chosen]
+    assert [[t.candidate.name for t in c] for c in forward._accept(trials)] == [[name] for name in chosen]
 
 
 @pytest.mark.parametrize(("base", "shares", "of_all"), [

@@ -41,7 +41,7 @@ class GravityOverTorque:
     names: tuple[TiedName, ...]
     since: bool
 
-    def said(self) -> str:
+    def in_words(self) -> str:
         """For a person: the ratio, everything that it may come from, and how to find out."""
         low, high = self.ratio.low, self.ratio.high
         told = f"Gravity over torque in {', '.join(self.where)} is {self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times " \
@@ -56,4 +56,4 @@ class GravityOverTorque:
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
-                "confidence": float(self.confidence), "names": [n.to_json() for n in self.names], "evidence": self.said()}
+                "confidence": float(self.confidence), "names": [n.to_json() for n in self.names], "evidence": self.in_words()}

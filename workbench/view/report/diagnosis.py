@@ -19,7 +19,7 @@ from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
-from workbench.view.report.tables import folded, place_of, rivals, tried
+from workbench.view.report.tables import folded_table, place_of, rejected_table, rivals
 from workbench.view.report.words import (
     capital,
     change,
@@ -108,7 +108,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     report.add(_residuals_section(diagnosis))
     others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", tried(others, "more that were tried")))
+        report.add(Section("What else was tried", rejected_table(others, "more that were tried")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
@@ -135,7 +135,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if why := diagnosis.provenance.get("engine", {}).get("because"):
         what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:
-        what.append("The search stopped at its limit of work, so not all that is left was looked into.")
+        what.append("The search stopped at its work limit, so some residuals were not examined.")
     return " ".join(what)
 
 
@@ -146,7 +146,7 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
         sure = f"{probable(f.together)} sure" + (
             f" {this_or(f.tie)}" if f.tie else
             f"; or {title_of(rival.effect, rival.where)}: {probable(rival.confidence)}" if rival else "")
-        told = max(f.parameters.values(), key=_bounded, default=None)
+        told = max(f.parameters.values(), key=_is_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in takes:
         before, after = s.ratios(s.before), s.ratios(s.after)
@@ -155,7 +155,7 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
     return numbers[:8]
 
 
-def _bounded(e: Estimate) -> bool:
+def _is_bounded(e: Estimate) -> bool:
     """Whether the data say anything of it."""
     return bool(np.isfinite([e.low, e.high]).any())
 
@@ -176,17 +176,17 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
         if over and diagnosis.verdict != "no_gap":
             said = f"The recordings differ from the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
         else:
-            said = "Nowhere do the recordings differ from the nominal model by more than chance" + (
+            said = "The recordings do not differ from the nominal model by more than chance" + (
                 "; the table shows the closest candidates." if diagnosis.gap else ".")
         parts.append(Text(said))
         at_joints: dict[str, float] = {}
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
         parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
-                             "Error of each joint with the nominal model; one wrong joint moves others."))
+                             "Error of each joint with the nominal model; an error in one joint also moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
-        parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
+        parts += folded_table(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
@@ -239,7 +239,7 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
     instead = [r for r in rejected if rivals(r, finding)]
     if instead:
         parts.append(Text("Alternatives that were tried and rejected:"))
-        parts += tried(instead, "more rivals")
+        parts += rejected_table(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
@@ -286,7 +286,7 @@ def _residuals_section(diagnosis: Diagnosis) -> Section:
     header = ["remaining error", "take", "size", "over noise", "correlation"]
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On unseen stretches the fitted model still exceeds noise and numerical error (1×). No "
-                  "effect that was tried explains it."), *folded(header, off, "more")] if off else []
+                  "effect that was tried explains it."), *folded_table(header, off, "more")] if off else []
     return Section("Residuals", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
