@@ -21,7 +21,9 @@ Entry = dict[str, Any]
 JOINT, ARM = "servo", "arm"
 DUTY_PER_UNIT = 0.16489
 """Duty per radian of position error for each unit of the firmware's position gain, as the logs' authors state it."""
-GAINS, PROGRAMMES = (8, 16, 32), ("lift_and_drop", "sin_sin")
+GAINS = (8, 16, 32)
+SPLITS = {"first": ("lift_and_drop", "sin_sin"), "second": ("sin_time_square", "up_and_down")}
+"""Programmes of motion that make one session: every change is asked twice, of logs that have nothing in common."""
 SERVO = {"model": "STS3215", "stall_torque": 2.94, "no_load_speed": 4.71, "rated_voltage": 12.0, "supply_voltage": 12.0,
          "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278}
 """Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1);
@@ -80,7 +82,7 @@ class Case:
     moment: float | None = None
     within: float = 0.05
     gains: Sequence[int] = GAINS
-    programmes: Sequence[str] = PROGRAMMES
+    programmes: Sequence[str] = SPLITS["first"]
 
 
 def goals_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:

@@ -18,7 +18,7 @@ from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
+from workbench.view.report.servo_law import recalibrated_section, tied_in_short, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded_table, place_of, rejected_table, rivals
 from workbench.view.report.words import (
     capital,
@@ -26,6 +26,7 @@ from workbench.view.report.words import (
     headline,
     hidden_effects,
     in_words,
+    interval,
     intervals_of,
     is_error,
     layers_of,
@@ -94,11 +95,11 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
                     Provenance(diagnosis.nominal.sha256, seed, seconds, more))
     report.add(_where(diagnosis, takes))
     drawn: set[tuple[int, str]] = set()
+    if diagnosis.tied:
+        report.add(tied_section(diagnosis.tied))
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
         report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
-    if diagnosis.tied:
-        report.add(tied_section(diagnosis.tied))
     for unknown in diagnosis.unknown_torques:
         report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:
@@ -115,7 +116,9 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
 
 
 def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
-    what = [*(sentence_of(f) for f in diagnosis.findings), *(u.evidence for u in diagnosis.unknown_torques)]
+    what = [*(tied_in_short(t) for t in diagnosis.tied),
+            *(sentence_of(f) for f in diagnosis.findings if f.of_tie is None),
+            *(u.evidence for u in diagnosis.unknown_torques)]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
         what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that "
@@ -140,8 +143,9 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
 
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
-    numbers = []
-    for f in diagnosis.findings:
+    numbers = [(f"gravity over torque at {listed(t.where)}", f"{t.ratio.value:.2f}×",
+                f"{interval(t.ratio)}; {len(t.competitive)} effects or other torques could be the cause") for t in diagnosis.tied]
+    for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (
             f" {this_or(f.tie)}" if f.tie else
@@ -225,6 +229,8 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
     if finding.tie:
         sure += f": {probable(finding.together)} for one of the two"
+    if finding.of_tie is not None:
+        sure += f"; one of several names of gravity over torque, {probable(finding.of_tie)} together"
     f = finding.family
     family = [] if f is None else [["probability of the family", f"{f.name}: {probable(f.confidence)}"]]
     rows = [["probability", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]

@@ -27,6 +27,16 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
     return Section(f"Unknown torque at {unknown.joint}", parts)
 
 
+def tied_in_short(tie: GravityOverTorque) -> str:
+    """Gravity over torque, and the names of everything that could be the cause."""
+    causes = [title_of(n.effect, n.where) for n in tie.competitive]
+    if tie.may_be_torque:
+        causes.append("other torques of the servo")
+    if len(causes) == 1:
+        return f"{tie.change} Cause: {causes[0]}."
+    return f"{tie.change} Angles alone do not tell the cause: {listed(causes, 'or')}."
+
+
 def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
     """Gravity over torque, and each effect that would explain it alone."""
     rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]

@@ -10,6 +10,7 @@ from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.results.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.identify.results.reasons import Dependence, Statement
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import EffectSpec
 
 NAMED = 0.1
@@ -25,7 +26,7 @@ _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
     likely = [f for f in diagnosis.findings if f.likely]
-    names = listed([_with_rival(f) for f in likely or diagnosis.findings])
+    names = listed([_with_rival(f, diagnosis.tied) for f in likely or diagnosis.findings])
     explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
     match diagnosis.verdict:
         case "no_gap":
@@ -52,7 +53,10 @@ def hidden_effects(why: Mapping[str, str]) -> list[str]:
     return [f"**Cannot show here**, because {reason}: {listed(effects)}." for reason, effects in by_reason.items()]
 
 
-def _with_rival(f: Finding) -> str:
+def _with_rival(f: Finding, tied: Sequence[GravityOverTorque]) -> str:
+    if tie := tie_of(f, tied):
+        others = [title_of(n.effect, n.where) for n in tie.competitive]
+        return f"a change of gravity over torque at {listed(tie.where)} ({listed(others, 'or')})"
     rival = rival_of(f)
     return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
 
@@ -65,6 +69,13 @@ def probable(p: float) -> str:
 def rival_of(finding: Finding) -> Alternative | None:
     """The alternative that is likely enough to be named wherever the finding is."""
     return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
+
+
+def tie_of(finding: Finding, tied: Sequence[GravityOverTorque]) -> GravityOverTorque | None:
+    """The tie of which a finding is one name of several."""
+    if finding.of_tie is None:
+        return None
+    return next((t for t in tied if any((n.effect, n.where) == (finding.effect, finding.where[:1]) for n in t.names)), None)
 
 
 def this_or(tie: Alternative) -> str:
