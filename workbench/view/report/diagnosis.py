@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.options import PROBLEM
-from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
+from workbench.identify.results.findings import Diagnosis, Estimate, GapEntry
 from workbench.identify.results.take_report import TakeReport
 from workbench.types import Progress
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
-from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
+from workbench.view.figures.gap import gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
-from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.report.finding import finding_section, finite
+from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Text
 from workbench.view.report.servo_law import recalibrated_section, tied_in_short, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded_table, place_of, rejected_table, rivals
 from workbench.view.report.words import (
     capital,
-    change,
     headline,
     hidden_effects,
     in_words,
     interval,
-    intervals_of,
     is_error,
     layers_of,
     left_row,
@@ -39,7 +38,6 @@ from workbench.view.report.words import (
     sentence_of,
     this_or,
     title_of,
-    unbroken,
 )
 from workbench.view.scene.marks import Errors
 from workbench.view.scene.replay import write_replay
@@ -99,7 +97,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
         report.add(tied_section(diagnosis.tied))
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
-        report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
+        report.add(finding_section(finding, diagnosis.rejected, takes, drawn, elsewhere))
     for unknown in diagnosis.unknown_torques:
         report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:
@@ -154,7 +152,7 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in takes:
         before, after = s.ratios(s.before), s.ratios(s.after)
-        worst = max(before, key=lambda c: _finite(before[c]))
+        worst = max(before, key=lambda c: finite(before[c]))
         numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
     return numbers[:8]
 
@@ -171,7 +169,7 @@ def _size(e: Estimate) -> str:
 def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
     parts: list[Part] = []
     if takes:
-        worst = {c: max((_finite(s.ratios(s.before).get(c, math.nan)) for s in takes), default=0.0)
+        worst = {c: max((finite(s.ratios(s.before).get(c, math.nan)) for s in takes), default=0.0)
                  for s in takes for c in s.channels}
         ledger = sorted(diagnosis.gap, key=lambda g: -g.error / g.floor if g.floor > 0 else -math.inf)
         over = list(dict.fromkeys(place for g in ledger for place in g.where))
@@ -207,63 +205,12 @@ def _map_caption(take: TakeReport) -> str:
 
 
 def _worst(take: TakeReport) -> float:
-    return max(map(_finite, take.ratios(take.before).values()))
+    return max(map(finite, take.ratios(take.before).values()))
 
 
 def _gap_row(g: GapEntry) -> list[str]:
     when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in g.when[:3]) + (" …" if len(g.when) > 3 else "")
     return [g.layer, place_of(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
-
-
-def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[TakeReport], drawn: set[tuple[int, str]],
-             others: Collection[str]) -> Section:
-    """drawn: takes and joints that the page has a figure of; this section's is added. others: places of other findings."""
-    said = sentence_of(finding)
-    parts: list[Part] = [Text(said)]
-    if finding.evidence not in said:
-        parts.append(Text(finding.evidence.removeprefix(said).strip()))
-    sure = probable(finding.confidence)
-    for a in finding.alternatives:
-        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {probable(a.confidence)}.** These recordings alone do not rule "
-                          "that out."))
-        sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
-    if finding.tie:
-        sure += f": {probable(finding.together)} for one of the two"
-    if finding.of_tie is not None:
-        sure += f"; one of several names of gravity over torque, {probable(finding.of_tie)} together"
-    f = finding.family
-    family = [] if f is None else [["probability of the family", f"{f.name}: {probable(f.confidence)}"]]
-    rows = [["probability", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
-    rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
-    parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
-    shown = _best_view(finding, takes, drawn, others)
-    if shown is not None:
-        i, joint = shown
-        drawn.add(shown)
-        parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: recorded, and predicted by each "
-                                                              "model."))
-    instead = [r for r in rejected if rivals(r, finding)]
-    if instead:
-        parts.append(Text("Alternatives that were tried and rejected:"))
-        parts += rejected_table(instead, "more rivals")
-    return Section(capital(title_of(finding.effect, finding.where)), parts)
-
-
-def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]
-               ) -> tuple[int, str] | None:
-    """The take and joint on which the finding shows most: its own joint, else the one that improved most of those that are no
-    place of another finding; one that is not yet drawn, if there is any."""
-    found = [(_gain(s, c), i, c) for i, s in enumerate(takes) for c in s.channels if c in s.recorded.joints]
-    own = [f for f in found if f[2] in finding.where] or [f for f in found if f[2] not in others]
-    new = [f for f in own or found if f[1:] not in drawn]
-    if not found:
-        return None
-    _, i, joint = max(new or own or found)
-    return i, joint
-
-
-def _gain(take: TakeReport, channel: str) -> float:
-    return _finite(take.ratios(take.before)[channel]) - _finite(take.ratios(take.after)[channel])
 
 
 def _unseen(takes: Sequence[TakeReport]) -> Section:
@@ -299,7 +246,3 @@ def _residuals_section(diagnosis: Diagnosis) -> Section:
 def _next(diagnosis: Diagnosis) -> Section:
     assert diagnosis.next_experiment is not None
     return Section("What to record next", [Text(next_said(diagnosis.next_experiment))])
-
-
-def _finite(x: float) -> float:
-    return x if math.isfinite(x) else 0.0
