@@ -47,7 +47,8 @@ def _model() -> RobotModel:
     """The arm, parsed once for all runs."""
     with tempfile.TemporaryDirectory() as folder:
         model = arm(Path(folder))
-        assert model.joints and model.kinematics
+        assert model.joints
+        assert model.kinematics
     return model
 
 

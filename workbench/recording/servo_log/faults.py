@@ -60,7 +60,7 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     for joint, log in logs.items():
         if joint in no_goals:
             continue
-        said: list[str] = []
+        said = []
         if joint not in coarse:
             log, said = _zeroed(channels, log)
             said += _released(channels, recording, log)

@@ -15,8 +15,8 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class RoleChecks:
-    """unexplained: share of the goal's variance that the position, delayed and smoothed as by a servo, leaves at most; better: and
-    so many times less than the goal leaves of the position's. goes: least motion of both [deg]."""
+    """unexplained: share of the goal's variance that the position, delayed and smoothed as by a servo, leaves at most; better:
+    and so many times less than the goal leaves of the position's. goes: least motion of both [deg]."""
 
     unexplained: float = 0.1
     better: float = 4.0

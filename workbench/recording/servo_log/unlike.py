@@ -71,8 +71,8 @@ def _drift(log: JointLog, fit: Response, c: UnlikeChecks) -> Iterator[str]:
     slope, start = np.polyfit(since, away, 1)
     left = away - (slope * since + start)
     if abs(slope) > c.drift and np.var(left) < (1 - c.straight) * np.var(away):
-        yield (f"drifts by {slope:+.1f} deg against goal.{log.name} from the first row to the last: a horn or coupling that slips, "
-               "or a sensor whose zero creeps (warm potentiometer, integrated gyro)?")
+        yield (f"drifts by {slope:+.1f} deg against goal.{log.name} from the first row to the last: a horn or coupling that "
+               "slips, or a sensor whose zero creeps (warm potentiometer, integrated gyro)?")
 
 
 def _noise(log: JointLog, c: UnlikeChecks) -> Iterator[str]:
