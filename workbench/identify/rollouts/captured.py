@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.compare.channels import ACROSS, BODY, body_channels, joint_of
-from workbench.effects.apply import seen
+from workbench.effects.apply import apply_to_measurement
 from workbench.identify.problem import TakeEvidence
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.observe import frame_turn
@@ -93,7 +93,7 @@ def compiled_for(rollout: Rollout) -> CompiledJob | None:
 
 def _compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
     e, model = rollout.evidence, rollout.model
-    m = seen(e.take.measurement, model)
+    m = apply_to_measurement(e.take.measurement, model)
     links = [model.rigid_bodies[asset] for asset in m.pivots]
     frames = e.take.recorded.time - m.starts_at
     try:
