@@ -45,6 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "(default: the file that ships)")
     parser.add_argument("--method", choices=("search", "plan", "both"), default="search", help="plan: joint paths of trajectory "
                         "optimisation as tables, without a search; both: a search that begins at those, too (default: search)")
+    parser.add_argument("--map", metavar="FILE", help="map.json of a map of gaits: the search also starts from its nearest gait")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
@@ -61,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
     from workbench.gait.ensemble import load_ensemble
+    from workbench.gait.gait_map import load_map
     from workbench.gait.machine import GaitMachine
     from workbench.gait.optimize import MEMORY, optimize, options_of, write_gait
     from workbench.robot.model_file import load_model_file
@@ -72,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
     options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
     request = _request(args, model)
+    if args.map:
+        options = replace(options, given=(load_map(args.map, model).start_for(request),))
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)
         result = optimize(machine, request, ensemble, options, progress, args.out / MEMORY, other_engine())
