@@ -23,7 +23,6 @@ from workbench.identify.results.findings import (
 )
 from workbench.identify.results.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, WorseInPlace
 from workbench.identify.results.take_report import TakeReport
-from workbench.identify.results.tied_names import GravityOverTorque, TiedName
 from workbench.robot import RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
@@ -216,24 +215,6 @@ def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeR
     assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
     line = finding_line(tied)
     assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings cannot separate" in line
-
-
-def test_a_tie_of_gravity_and_torque_leads_and_its_names_have_their_own_share(model: RobotModel, take: TakeReport) -> None:
-    names = tuple(TiedName(effect, (where,), {}, f"It is {effect}.", behind)
-                  for effect, where, behind in (
-                      ("parallel_spring", "flm", 0.0), ("payload", "FLmid", 3.0), ("com_shift", "FLmid", 20.0)))
-    tie = GravityOverTorque(("flm",), Estimate(1.3, 1.22, 1.41, "1"), 0.98, names, True, 7.0)
-    spring = replace(finding("parallel_spring", 0.49), alternatives=(Alternative("payload", ("FLmid",), 0.49),), of_tie=0.98,
-                     parameters={"stiffness": Estimate(0.3, 0.2, 0.4, "N m/rad")})
-    found = replace(diagnosis(model), findings=(spring,), tied=(tie,))
-    assert headline(found) == ("A change of gravity over torque at flm (parallel spring at flm or payload at FLmid) explains all "
-                               "that the model missed.")
-    page = diagnosis_report(found, [take], "Session small").html()
-    assert "Gravity over torque in flm is 1.30 (1.22 to 1.41) times that of the earlier model. Angles alone do not tell" in page
-    assert page.index("What angles do not tell apart") < page.index("<h2>Parallel spring at flm")
-    assert "49 %, or payload at FLmid 49 %; one of several names of gravity over torque, 98 % together" in page
-    assert "98 % sure that it is this" not in page
-    assert "(confidence 0.49, as one of several names of gravity over torque, 0.98 together" in finding_line(spring)
 
 
 def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeReport) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.gait.draws import FEWEST, Drawn, bound, described, draw_margins, drawn, summary
+from workbench.gait.ensemble import Ensemble
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
@@ -93,3 +94,18 @@ def test_headings_are_compared_with_the_nominal_robots_which_is_trimmed():
     turns = replace(WALKED, turn_rate=0.3 * 0.5)
     assert heading_spread(Request(), turns, [turns, turns]) == pytest.approx(0.0)
     assert heading_spread(Request(), WALKED, [turns, turns]) == pytest.approx(0.5)
+
+
+def test_few_robots_show_both_ends_of_floor_and_supply(tmp_path):
+    model, ranges = puppy_model(), {"friction": (0.3, 0.9), "supply_voltage": (9.6, 12.0), "command_delay": (0.01, 0.02)}
+
+    def values(even, effect, parameter):
+        robots = Ensemble(ranges=ranges).draws(model, 8, 4, tmp_path, even)
+        return np.array([e.parameters[parameter] for r in robots for e in r.effects if e.effect == effect])
+
+    for effect, parameter, key in (("ground_friction", "friction", "friction"), ("supply_voltage", "voltage", "supply_voltage")):
+        low, high = ranges[key]
+        parts = [np.floor(8 * (values(even, effect, parameter) - low) / (high - low)) for even in (True, False)]
+        assert sorted(parts[0]) == list(range(8))
+        assert sorted(parts[1]) != list(range(8))
+    assert (values(True, "command_delay", "delay") == values(False, "command_delay", "delay")).all()

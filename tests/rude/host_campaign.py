@@ -7,6 +7,7 @@ faults that stay (a servo that falls silent) strike once, at event k. `Run.play`
 from __future__ import annotations
 
 import csv
+import functools
 import random
 import tempfile
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ from workbench.device.play import PlayOptions, perform
 from workbench.device.stop import Stop
 from workbench.files import InputError
 from workbench.motion import Motion
+from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile
 
 JOINTS = ("one", "three", "two")
@@ -38,6 +40,16 @@ EVERY = (3, 5, 7, 11, 17, 29, 53, 97)
 CLOCKS = {"fast clock": 1.01, "slow clock": 0.99}
 """The host's seconds in one of the servos'."""
 FAMILIES = ("AX-12A", "XL-330", "STS3215")
+
+
+@functools.cache
+def _model() -> RobotModel:
+    """The arm, parsed once for all runs."""
+    with tempfile.TemporaryDirectory() as folder:
+        model = arm(Path(folder))
+        assert model.joints
+        assert model.kinematics
+    return model
 
 
 @dataclass
@@ -113,7 +125,7 @@ class Run:
             return self._play(Path(folder))
 
     def _play(self, folder: Path) -> list[str]:
-        self.robot = r = robot(self.family, START, model=arm(folder))
+        self.robot = r = robot(self.family, START, model=_model())
         if self.fault == "slow adapter":
             r.port.latency, r.port.jitter = 1e-3 * (self.k % 17), 1e-3 * (self.k % 17) * (self.seed % 2)
         self._set_clock()
@@ -124,13 +136,15 @@ class Run:
         self.install()
         self.armed = True
 
+        servos, sense = list(r.servos.values()), r.body.sense
+        centre, count, unit = profile.centre, profile.count, profile.speed_unit
+
         def sample() -> None:
-            s = r.servos
-            angle = {v.joint: r.body.sense(v.joint, r.wire.clock.now).angle for v in s.values()}
+            now = r.wire.clock.now
             monitor.samples.append(Sample(
-                self.now, {v.joint: bool(v.powered and v["torque_enable"]) for v in s.values()},
-                {v.joint: profile.angle(v["goal_position"]) for v in s.values()}, angle,
-                {v.joint: v["moving_speed"] * profile.speed_unit for v in s.values()}))
+                self.now, {v.joint: v.powered and v["torque_enable"] != 0 for v in servos},
+                {v.joint: (v["goal_position"] - centre) * count for v in servos},
+                {v.joint: sense(v.joint, now).angle for v in servos}, {v.joint: v["moving_speed"] * unit for v in servos}))
             r.at(0.002, sample)
 
         r.at(0.0, sample)

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
               f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
               f"{profile.keep.decode()} and {profile.start.decode()}, and wait for the program's word; no port was opened")
         return 0
-    if not args.yes and not _agreed():
+    if not args.yes and not _confirm():
         raise InputError("flash", "not loaded: say yes, or give --yes")
     line = _line(args.port, profile.rate)
     transcript = Transcript()
@@ -95,7 +95,7 @@ def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its m
     return line
 
 
-def _agreed() -> bool:
+def _confirm() -> bool:
     if not sys.stdin.isatty():
         return False
     return input("Replace the program in the controller? [yes/no] ").strip().lower() == "yes"

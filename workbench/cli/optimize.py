@@ -11,6 +11,7 @@ from workbench.cli.check import check_model
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
+    from workbench.gait.optimize import OptimizeOptions
     from workbench.gait.request import Request
     from workbench.robot import RobotModel
 
@@ -45,6 +46,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "(default: the file that ships)")
     parser.add_argument("--method", choices=("search", "plan", "both"), default="search", help="plan: joint paths of trajectory "
                         "optimisation as tables, without a search; both: a search that begins at those, too (default: search)")
+    parser.add_argument("--start", metavar="MOTION", help="the gait.csv of another gait: the search begins there instead of at "
+                        "random gaits; its certificate is read from the same folder")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
@@ -55,14 +58,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Searches, certifies, writes, and says what came of it."""
-    from dataclasses import replace
-
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
     from workbench.gait.ensemble import load_ensemble
     from workbench.gait.machine import GaitMachine
-    from workbench.gait.optimize import MEMORY, optimize, options_of, write_gait
+    from workbench.gait.optimize import MEMORY, optimize, write_gait
     from workbench.robot.model_file import load_model_file
     from workbench.view.report.gait import write_gait_page
 
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
-    options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
+    options = _options(args)
     request = _request(args, model)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)
@@ -87,6 +88,22 @@ def run(args: argparse.Namespace) -> int:
     print(result.certified.certificate.summary())
     print(f"wrote {args.out}: open {args.out / 'report.html'}")
     return 0
+
+
+def _options(args: argparse.Namespace) -> OptimizeOptions:
+    """Size, method and start of the search."""
+    from dataclasses import replace
+
+    from workbench.files import InputError
+    from workbench.gait.certificate import read_shape
+    from workbench.gait.optimize import options_of
+
+    options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
+    if args.start is None:
+        return options
+    if args.method == "plan":
+        raise InputError(None, "--start with --method plan: expected a method that searches")
+    return replace(options, given=(read_shape(args.start),), planned=False, budget=replace(options.budget, seeds=0))
 
 
 def _request(args: argparse.Namespace, model: RobotModel) -> Request:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.compare.comparison import aligned
+from workbench.compare.comparison import align
 from workbench.compare.options import FILES
 from workbench.compare.session import Session, TakeSpec
 from workbench.effects.apply import seen
@@ -76,7 +76,7 @@ class RegisteredTake(ReadTake):
 
         model: the robot that was simulated, where its effects are not this take's: some change what cameras see."""
         if not self.recorded.zeroed:
-            return aligned(rollout.as_logged(), self.recorded)
+            return align(rollout.as_logged(), self.recorded)
         model = model or self.model
         return observe(rollout, seen(self.measurement, model), model, self.recorded.time)[0]
 

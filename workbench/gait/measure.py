@@ -70,11 +70,6 @@ class GaitMeasure:
         """Forward [m/s]."""
         return self.velocity[0]
 
-    @property
-    def drift_per_metre(self) -> float:
-        """Change of heading by distance [rad/m]; of less than a centimetre as of one."""
-        return self.drift / max(self.gone, 0.01)
-
 
 def fallen(joints: int) -> GaitMeasure:
     """Of a run that was given up because the robot lay on the floor, or its links met."""

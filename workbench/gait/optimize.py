@@ -180,8 +180,8 @@ class _Draws:
     folder: Path
 
     def searched(self) -> list[RobotModel]:
-        """Those of the search."""
-        return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder)
+        """Those of the search, floor and supply spread evenly."""
+        return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder, even=True)
 
     def screening(self) -> list[RobotModel]:
         """Those of the finalists."""
@@ -220,6 +220,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     said = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
+    progress(f"{said}; looking for the nearest that works", None)  # before the search, which takes half a minute
     look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)

@@ -47,7 +47,7 @@ def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
         lead = _lead(r.time[on], goal[on], position[on], c)
         if lead is not None:
             yield (f"position.{joint}: precedes goal.{joint} by {1e3 * lead:.0f} ms, which no servo does: were the goals logged "
-                   "late, or derived from the motion?")
+                   "late, or derived from the motion, or are the two columns exchanged?")
 
 
 def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:

@@ -17,6 +17,8 @@ from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.logged import as_logged
+from workbench.recording.servo_log.other_channels import channel_problems, few_rows
+from workbench.recording.servo_log.reversed_roles import reversed_roles
 from workbench.recording.servo_log.started import ramp_problems
 from workbench.recording.servo_log.supply import supply_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
@@ -57,13 +59,19 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     view."""
     time = recording.time
     _bounded(recording, checks)
-    if recording.sensing != "encoders" or len(time) < 3 or np.any(np.diff(time) <= 0):
+    if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
-    channels, problems = dict(recording.channels), list(recording.problems)
+    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
+    if len(time) < 3:
+        return replace(recording, problems=tuple(problems))
+    exchanged = dict(reversed_roles(recording))
+    problems += exchanged.values()
     for joint in recording.joints:
         name = f"position.{joint}"
         goal = channels.get(f"goal.{joint}")
-        if name in channels and not (goal is not None and _in_another_unit(goal)):
+        if joint in exchanged:
+            channels[name] = np.full(len(time), np.nan)
+        elif name in channels and not (goal is not None and _in_another_unit(goal)):
             channels[name], said = without_leaps(time, channels[name])
             problems += [f"{name}: {text}" for text in said]
     read = replace(recording, channels=channels)
@@ -71,6 +79,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         problems += check(read, checks)
     problems += unit_problems(read)
     problems += supply_problems(read)
+    problems += channel_problems(read)
     mended = without_faults(read, frozenset(j for j in read.joints if any(
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.effects.apply import played
+from workbench.effects.apply import played, resolved
+from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -17,6 +18,9 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import BaseState
 from workbench.simulation.stepped import followed
+
+LOOK_BACK = 2.0
+"""How long a sent command can still reach the servos [s]: an effect delays by at most 0.5 s, and no servo by more."""
 
 
 class CompiledSteppedRun:
@@ -33,11 +37,13 @@ class CompiledSteppedRun:
         self._sent: Commands | None = None
         self._played: Commands | None = None
         self._pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        retiming = [effect for effect, _, _ in resolved(model) if type(effect).commands is not Effect.commands]
+        self._only_delayed = all(effect.like_a_late_start for effect in retiming)
 
     def send(self, commands: Commands) -> None:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
         self._sent = followed(self._sent, commands.reordered(self.model.joints), self.time)
-        self._played = played(self._sent, self.model)
+        self._played = played(self._recent(self._sent), self.model)
 
     def advance(self, seconds: float) -> None:
         """Advances the run by `seconds`, rounded to whole steps of the log."""
@@ -48,6 +54,14 @@ class CompiledSteppedRun:
         begin = 1 if self._pieces else 0  # a piece begins with the row with which the one before it ended
         self._pieces.append((log.q[begin:], log.v[begin:], log.base[begin:]))
         self.time = end
+
+    def _recent(self, sent: Commands) -> Commands:
+        """Without those that no longer matter, where effects only delay: else each piece costs more than the one before."""
+        old = int(np.searchsorted(sent.times, self.time - LOOK_BACK)) - 1
+        if old < 1 or not self._only_delayed:
+            return sent
+        rows = {f: getattr(sent, f)[old:] for f in ("times", "goals", "speeds", "enabled", "poses")}
+        return replace(sent, begun=True, **rows)
 
     def _log(self, rows: int) -> Log:
         n, m, shapes = len(self._job.tables.joints), len(self.model.joints), len(self._job.machine.shapes.body)

@@ -13,11 +13,11 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
 from workbench.identify.results.take_report import TakeReport
 from workbench.types import Progress
-from workbench.view.figures import body_path, film_strip
+from workbench.view.figures import body_path
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
-from workbench.view.figures.heat import DARKEST
-from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.report.page import Details, Part, Picture, Provenance, Report, Section, Table, Text
+from workbench.view.report.replays import write_replays
 from workbench.view.report.servo_law import recalibrated_section, tied_in_short, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
@@ -41,8 +41,6 @@ from workbench.view.report.words import (
     title_of,
     unbroken,
 )
-from workbench.view.scene.marks import Errors
-from workbench.view.scene.replay import write_replay
 
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
@@ -54,34 +52,11 @@ def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: P
     returns their paths. takes: the takes behind the diagnosis; progress: called with the current file and the share done."""
     paths = diagnosis.save(folder)
     report = diagnosis_report(diagnosis, takes, title)
-    replays: list[Part] = []
-    for i, take in enumerate(takes):
-        progress(f"drawing {take.name}", i / len(takes))
-        paths.append(folder / f"replay-{take.name}.html")
-        errors = _errors(take)
-        write_replay(paths[-1], diagnosis.model, take.fitted, take.recorded, take.name, errors)
-        poster = film_strip(diagnosis.model, take.fitted, take.recorded)
-        replays.append(Replay(paths[-1], _replay_caption(take, errors), poster))
+    replays = write_replays(diagnosis, takes, folder, progress)
+    paths += [folder / f"replay-{take.name}.html" for take in takes]
     if replays:
         report.add(Section("See it move", replays))
     return [report.write(folder / "report.html"), *paths]
-
-
-def _errors(take: TakeReport) -> list[Errors]:
-    """Legend of the replay's error map: that of the nominal model, and on demand that of the fitted one."""
-    out = [Errors("error against the nominal model", take.time, take.channels, take.before)]
-    if not np.array_equal(take.before, take.after, equal_nan=True):
-        out.append(Errors("error against the fitted model", take.time, take.channels, take.after, shown=False))
-    return out
-
-
-def _replay_caption(take: TakeReport, errors: Sequence[Errors]) -> str:
-    said = (f"{take.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
-            f"above, as it runs: small and pale where a joint is within {LIMIT:g} times noise and numerics of the nominal model, "
-            f"large and dark at {DARKEST:g} times, grey where it was not seen.")
-    if any(c in BODY for c in take.channels):
-        said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
-    return said + (" Tick the fitted model's to see the residuals." if len(errors) > 1 else "")
 
 
 def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: str) -> Report:
@@ -144,7 +119,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
     numbers = [(f"gravity over torque at {listed(t.where)}", f"{t.ratio.value:.2f}×",
-                f"{interval(t.ratio)}; {len(t.competitive)} effects or other torques could be the cause") for t in diagnosis.tied]
+                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}") for t in diagnosis.tied]
     for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (

@@ -29,7 +29,11 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
 
 def tied_in_short(tie: GravityOverTorque) -> str:
     """Gravity over torque, and the names of everything that could be the cause."""
-    causes = [*(title_of(n.effect, n.where) for n in tie.competitive), "other torques of the servo"]
+    causes = [title_of(n.effect, n.where) for n in tie.competitive]
+    if tie.may_be_torque:
+        causes.append("other torques of the servo")
+    if len(causes) == 1:
+        return f"{tie.change} Cause: {causes[0]}."
     return f"{tie.change} Angles alone do not tell the cause: {listed(causes, 'or')}."
 
 
