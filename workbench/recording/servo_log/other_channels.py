@@ -14,10 +14,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class ChannelChecks:
-    """amperes, celsius: more than a hobby servo takes [A] and stands [deg C]. turns_off: a joint that moves so far while its
-    torque is said to be off in every row [deg], and whose position the goals explain to `follows`, is on. faster: by so many times
-    a joint exceeds the moving speed that its goals have. opposite: correlation of duty with the way from position to goal, below
-    which it has the other sign. moves: least motion that tells [deg]. fewest: least number of rows."""
+    """amperes, celsius: no hobby servo takes more [A] or stands more [deg C]. turns_off: a joint that moves so far while its
+    torque is said to be off in every row [deg], and whose position the goals explain to `follows`, has it on. faster: a joint
+    that exceeds the moving speed of its goals so many times. opposite: correlation of duty with the distance from position to
+    goal, below which it has the other sign. moves: least motion that tells [deg]. fewest: least number of rows."""
 
     amperes: float = 20.0
     celsius: float = 120.0
@@ -62,8 +62,8 @@ def _enabled(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
     if log is None or np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) < c.turns_off:
         return
     if followed(log.time, log.goal, log.position).explained > c.follows:
-        yield (f"enabled.{joint}: is 0 in every row while position.{joint} follows goal.{joint}: is the column inverted (1: torque "
-               "on)? The joint counts as limp")
+        yield (f"enabled.{joint}: is 0 in every row while position.{joint} follows goal.{joint}: is the column inverted "
+               "(1: torque on)? The joint counts as limp")
 
 
 def _speed(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
@@ -93,8 +93,8 @@ def _duty(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
         return
     alike = float(np.corrcoef(drive[known], way[known])[0, 1])
     if alike < c.opposite:
-        yield (f"duty.{joint}: is opposite to the way from position.{joint} to goal.{joint} (correlation {alike:.2f}): has it the "
-               "other sign?")
+        yield (f"duty.{joint}: is opposite to the way from position.{joint} to goal.{joint} (correlation {alike:.2f}): has it "
+               "the other sign?")
 
 
 def _largest(values: Array) -> float:
