@@ -7,6 +7,7 @@ import os
 import time
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 from workbench.files.errors import InputError
 
@@ -25,7 +26,7 @@ class AppendedFile:
         except OSError as e:
             raise InputError(path, f"cannot be written ({e.strerror})") from None
 
-    def __enter__(self) -> AppendedFile:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:

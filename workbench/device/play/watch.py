@@ -32,10 +32,10 @@ class WatchOptions:
     """When a reading counts.
 
     confirm: how many readings, or unanswered questions, in a row of one servo. silent: how long it may go unheard [s], whether
-    it was asked or not. failures, share: with at least so many unanswered questions within that time, and at least such a
-    share of them, a motion ends even if the servo answered in between, which happens where two have its ID. cooler: how far below the limit at which it shuts
-    itself down it has to stay [deg C], so that there is torque left for the way to neutral. dead: share of the lowest voltage
-    below which a ramp would only brown out again.
+    it was asked or not. failures, share: with at least so many unanswered questions within that time, and at least such a share
+    of them, a motion ends even if the servo answered in between, which happens where two have its ID. cooler: how far below the
+    limit at which it shuts itself down it has to stay [deg C], so that there is torque for the way to neutral. dead: share of
+    the lowest voltage below which a ramp would only brown out again.
     """
 
     confirm: int = 2
