@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.gait.draws import FEWEST, Drawn, bound, described, draw_margins, drawn, summary
+from workbench.gait.draws import FEWEST, Drawn, bound, described, draw_margins, drawn, screened_count, summary
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.limits import allowed_rms
@@ -36,6 +36,18 @@ def test_one_robot_in_ten_may_break_a_limit_and_no_more(machine):
     assert broken.use == pytest.approx(4 / 3)
     assert str(broken) == "tilt over draws, 9 of 10 robots: 40 of 30 deg"
     assert margins(machine, [WALKED] * 7 + [steep])["tilt over draws"].use > 1  # of eight, none
+
+
+def test_a_screening_of_a_few_robots_refuses_only_what_contradicts_nine_in_ten(machine):
+    steep = replace(WALKED, tilt=np.radians(40))
+
+    def use(good, bad):
+        draws = [WALKED] * good + [steep] * bad
+        return {m.name: m.use for m in draw_margins(machine, Request(), draws, screen=True)}["tilt over draws"]
+
+    assert use(7, 1) < 1 < use(6, 2)
+    assert use(21, 3) < 1 < use(20, 4)
+    assert screened_count(8) == 7
 
 
 @pytest.mark.parametrize(("change", "name", "use"), [

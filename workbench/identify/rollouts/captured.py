@@ -3,6 +3,7 @@ take, and outside Python's lock. Rollouts that the compiled station does not cov
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
@@ -17,7 +18,7 @@ from workbench.recording.mocap.observe import frame_turn
 from workbench.recording.mocap.tracks import SeenJoint, seen_joints, turned_quaternion
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import Kinematics, RobotModel
 from workbench.simulation.batch import run_job, simulate_stream
 from workbench.simulation.cluster import on_cluster
 from workbench.simulation.compiled import NotCoveredError
@@ -26,6 +27,9 @@ from workbench.simulation.compiled.station import CompiledJob, announced
 from workbench.simulation.compiled.turns import joint_turns
 from workbench.simulation.job import Job
 from workbench.types import Array
+
+KEPT = 32
+"""Robots and sets of tracked bodies whose joints are kept."""
 
 
 class Rollout(NamedTuple):
@@ -119,9 +123,18 @@ def _compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
     return out
 
 
+_joints: OrderedDict[object, tuple[Kinematics, list[SeenJoint]]] = OrderedDict()
+
+
 def _looked_at(e: TakeEvidence, model: RobotModel) -> list[SeenJoint]:
-    """Joints between bodies that cameras track."""
-    return seen_joints(tuple(e.take.measurement.pivots), model, e.take.spec.base)[0]
+    """Joints between bodies that cameras track; found once for the same robot and bodies, whatever its effects."""
+    kinematics, assets = model.kinematics, tuple(e.take.measurement.pivots)
+    key = (id(kinematics), tuple(model.rigid_bodies.items()), model.base, assets, e.take.spec.base)
+    if key not in _joints:
+        _joints[key] = (kinematics, seen_joints(assets, model, e.take.spec.base)[0])  # held, so that the id stays its own
+        while len(_joints) > KEPT:
+            _joints.popitem(last=False)
+    return _joints[key][1]
 
 
 def _body(e: TakeEvidence, model: RobotModel, m: Measurement, bodies: SeenBodies, assets: list[str], frame: Array) -> Array:
