@@ -85,13 +85,15 @@ class Case:
     programmes: Sequence[str] = SPLITS["first"]
 
 
-def goals_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
-    """Goals as if they had been sent `shift` [s] earlier, by a clock that runs `rate` times as fast."""
+def commands_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
+    """Goals and the command to let go as if sent `shift` [s] earlier, by a clock that runs `rate` times as fast."""
     def edited(rows: list[Entry]) -> list[Entry]:
         time = np.array([r["timestamp"] for r in rows])
         goal = np.array([r["goal_position"] for r in rows])
-        moved = np.interp(time[0] + (time - time[0]) * rate + shift, time, goal)
-        return [r | {"goal_position": float(g)} for r, g in zip(rows, moved)]
+        at = time[0] + (time - time[0]) * rate + shift
+        enabled = [rows[k]["torque_enable"] for k in np.maximum(np.searchsorted(time, at, side="right") - 1, 0)]
+        moved = np.interp(at, time, goal)
+        return [r | {"goal_position": float(g), "torque_enable": on} for r, g, on in zip(rows, moved, enabled)]
     return edited
 
 
@@ -107,8 +109,8 @@ CASES = (
     Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), moment=1.46192 / 1.12685, within=0.2),
     Case("arm", "arm100_0.741kg", effects=("com_shift", "payload"), moment=0.74437 / 1.12685, within=0.2),
     Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
-    Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
-    Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
+    Case("delay", "arm150_0.741kg", 2, edit=commands_at(0.04), effects=("command_delay",), size=0.04),
+    Case("clock", "arm150_0.741kg", 2, edit=commands_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
     Case("zero", "arm150_0.741kg", 2, edit=turned(3.0), effects=("zero_offset", "ground_tilt"), size=-3.0),
 )
 

@@ -49,6 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "optimisation as tables, without a search; both: a search that also starts from those (default: search)")
     parser.add_argument("--start", metavar="MOTION", help="the gait.csv of another gait: the search starts there instead of from "
                         "random gaits; its certificate is read from the same folder")
+    parser.add_argument("--map", metavar="FILE", help="map.json of a map of gaits: the search also starts from its nearest gait")
     parser.add_argument("--effort", type=positive, default=4, metavar="N",
                         help="search effort: 1 for a first look, more for longer (default: 4)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
@@ -73,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
     check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
-    options = _options(args)
     request = _request(args, model)
+    options = _options(args, model, request)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)
         result = optimize(machine, request, ensemble, options, progress, args.out / MEMORY, other_engine())
@@ -92,20 +93,24 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _options(args: argparse.Namespace) -> OptimizeOptions:
+def _options(args: argparse.Namespace, model: RobotModel, request: Request) -> OptimizeOptions:
     """Size, method and start of the search."""
     from dataclasses import replace
 
     from workbench.files import InputError
     from workbench.gait.certificate import read_shape
+    from workbench.gait.gait_map import load_map
     from workbench.gait.optimize import options_of
 
     options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
+    if args.map is not None:
+        options = replace(options, given=(load_map(args.map, model).start_for(request),))
     if args.start is None:
         return options
     if args.method == "plan":
         raise InputError(None, "--start with --method plan: expected a method that searches")
-    return replace(options, given=(read_shape(args.start),), planned=False, budget=replace(options.budget, seeds=0))
+    return replace(options, given=(*options.given, read_shape(args.start)), planned=False,
+                   budget=replace(options.budget, seeds=0))
 
 
 def _request(args: argparse.Namespace, model: RobotModel) -> Request:

@@ -133,10 +133,11 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
-    """The commands on which the servos act: those sent, delayed as in the nominal law, and changed by effects."""
+    """The commands on which the servos act: those sent, goals delayed as in the nominal law, and changed by effects. A servo that
+    delays its goals still lets go at once: the duty register of an STS3215 is zero in the row that switches it off."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
-        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)
+        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
     for effect, spec, values in resolved(model):
         commands = effect.commands(commands, spec.where, values, model)
     return commands

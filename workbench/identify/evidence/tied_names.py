@@ -37,9 +37,9 @@ class Ratio:
         between_days = (options.drift or SinceThen()).torque
         return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
 
-    def estimate(self) -> Estimate:
-        """With its 90 % interval."""
-        half = CONCLUSIONS.z90 * CONCLUSIONS.wider * self.sd
+    def estimate(self, options: EvidenceOptions) -> Estimate:
+        """With its 90 % interval, as much wider than the fit claims as any number of a servo's law (`EvidenceOptions.formal`)."""
+        half = CONCLUSIONS.z90 * options.formal * self.sd
         return Estimate(math.exp(self.log), math.exp(self.log - half), math.exp(self.log + half), "1")
 
 
@@ -136,5 +136,5 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
     ties = [as_torque(region, options, p.best, c) for c in p.best.hypothesis.effects]
     share = min((t.share for t in ties if t is not None), default=1.0)
     there = sum(w for f, w in p.weights if any(c.effect.tied == GRAVITY for c in f.hypothesis.effects))
-    return GravityOverTorque(region.joints, ratio.estimate(), min(1.0, CONCLUSIONS.surest * share * there), tuple(names),
-                             options.drift is not None, options.occam, fits.behind(fits.torque))
+    return GravityOverTorque(region.joints, ratio.estimate(options), min(1.0, CONCLUSIONS.surest * share * there),
+                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque))

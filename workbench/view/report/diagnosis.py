@@ -117,7 +117,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
     numbers = [(f"gravity over torque at {listed(t.where)}", f"{t.ratio.value:.2f}×",
-                f"{interval(t.ratio)}; {len(t.competitive)} effects or other torques could be the cause") for t in diagnosis.tied]
+                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}") for t in diagnosis.tied]
     for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (
