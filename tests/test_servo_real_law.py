@@ -102,7 +102,7 @@ def test_a_servo_that_delays_its_goals_lets_go_at_once(tmp_path):
     model, late = rig_model(tmp_path, PLAIN), rig_model(tmp_path, replace(PLAIN, goal_delay=0.02))
     delay = model.with_effect(EffectSpec("command_delay", ("j",), {"delay": 0.02}))
     on = np.array([[True], [True], [False]])
-    log = Commands.from_log(np.array([0.0, 0.1, 0.2]), ("j",), np.array([[0.3], [0.5], [0.5]]), on)
+    log = commands_of_rows(np.array([0.0, 0.1, 0.2]), ("j",), np.array([[0.3], [0.5], [0.5]]), on)
     for robot, released in ((late, 0.2), (delay, 0.22)):
         heard = apply_to_commands(log, robot)
         assert heard.times[~heard.enabled[:, 0]][0] == pytest.approx(released)
