@@ -7,7 +7,7 @@ import pytest
 
 from tests.servo_rig import rig_model
 from workbench.identify.rollouts.windows import recorded_states
-from workbench.motion.commands import Commands
+from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, ServoConstants
 from workbench.simulation import SimulationConfig
@@ -31,7 +31,7 @@ class Log:
 
 def goals():
     time = np.arange(0.0, 3.0, 0.01)
-    return Commands.from_log(time, ("j",), (1.1 * np.sin(2.2 * time) + 0.5 * np.sin(7.0 * time))[:, None])
+    return commands_of_rows(time, ("j",), (1.1 * np.sin(2.2 * time) + 0.5 * np.sin(7.0 * time))[:, None])
 
 
 def angles(model, restarts=None, commands=None, times=TIMES):
