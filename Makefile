@@ -59,9 +59,10 @@ prove: $(STAMP)
 	$(BIN)/python -m tests.rude.prove --workers $(WORKERS)
 	$(BIN)/python -m studies.concealed_effects --workers $(WORKERS)
 
-# Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`.
+# Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`;
+# learned_gait needs the extra [learn].
 STUDIES := $(filter-out concealed_effects replay,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
-           $(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py))
+           $(filter-out learned_gait,$(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py)))
 
 studies: $(STAMP)
 	@set -e; for study in $(STUDIES); do echo "== $$study"; $(BIN)/python -m studies.$$study; done
