@@ -51,7 +51,7 @@ LOOSE = (10.0, 20.0)
 """Play of a loose servo [deg]."""
 TURNS, PACES = np.linspace(-0.15, 0.15, 5), (-1.0, -0.7, 0.5, 0.75, 1.0, 1.2)
 HOPELESS = 0.1
-"""Share of the healthy robot's speed below which the diagnosed model says nothing about the choice; the nominal one chooses then."""
+"""Share of the healthy robot's speed below which the diagnosed model's predictions are not used; the nominal ones are then."""
 CONFIG = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
 
 
@@ -138,7 +138,8 @@ def one(k: int, out: Path, shape: GaitShape, quick: bool, tell: Callable[[str], 
     cycles, turns, paces = (4, (0.0, 0.15), (0.75, 1.0)) if quick else (10, TURNS, PACES)
     gaits = candidates(family, cycles, [float(t) for t in turns], paces)
     itself = next(g for g in gaits if g.turn == 0.0 and g.pace == 1.0)
-    real, healthy, said = replace(model, effects=(damage,)), predicted(diagnosis.nominal, gaits), predicted(diagnosis.model, gaits)
+    real = replace(model, effects=(damage,))
+    healthy, said = predicted(diagnosis.nominal, gaits), predicted(diagnosis.model, gaits)
     hopeless = bool(said.max() < HOPELESS * healthy.max())
     row = {"name": name, "damage": {"effect": damage.effect, "joint": damage.where[0], **damage.parameters},
            "found": [[f.effect, list(f.where)] for f in diagnosis.findings], "candidates": len(gaits),
