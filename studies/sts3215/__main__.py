@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.common import ROOT, run_study
-from studies.sts3215.sessions import CASES, Case, write_session
+from studies.sts3215.sessions import CASES, SPLITS, Case, write_session
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
@@ -92,7 +92,7 @@ def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None,
         sizes = ", ".join(f"{k} {_told(e.value)} ({_told(e.low)} to {_told(e.high)})" for k, e in f.parameters.items())
         print(f"    {f.confidence:.2f} {f.effect}: {sizes}", flush=True)
     for t in result.diagnosis.tied:
-        print(f"    {t.confidence:.2f} {t.said()}", flush=True)
+        print(f"    {t.confidence:.2f} {t.in_words()}", flush=True)
     return outcome
 
 
@@ -112,7 +112,10 @@ def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) 
         outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress, args.memory))
         law = out / "law" / "diagnosis" / "model.yaml"
     known = load_model(law)
-    for case in (c for c in cases[1:] if not args.only or c.name in args.only):
+    wanted = [c for c in cases[1:] if not args.only or c.name in args.only]
+    if not quick:
+        wanted = [replace(c, name=f"{c.name}, {split}", programmes=SPLITS[split]) for split in args.splits for c in wanted]
+    for case in wanted:
         for previous, since in ((known, SINCE), (None, ALONE))[:1 if args.since_only else 2]:
             folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
             outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress, args.memory))
@@ -128,6 +131,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study resumes")
     parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="these sessions alone, beyond the law's")
+    parser.add_argument("--splits", nargs="*", default=list(SPLITS), choices=list(SPLITS), help="programmes of the sessions")
     parser.add_argument("--since-only", action="store_true", help="no session from itself alone but the one that gives the law")
     parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
     args, others = parser.parse_known_args()

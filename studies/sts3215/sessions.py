@@ -21,7 +21,9 @@ Entry = dict[str, Any]
 JOINT, ARM = "servo", "arm"
 DUTY_PER_UNIT = 0.16489
 """Duty per radian of position error for each unit of the firmware's position gain, as the logs' authors state it."""
-GAINS, PROGRAMMES = (8, 16, 32), ("lift_and_drop", "sin_sin")
+GAINS = (8, 16, 32)
+SPLITS = {"first": ("lift_and_drop", "sin_sin"), "second": ("sin_time_square", "up_and_down")}
+"""Programmes of motion that make one session: every change is asked twice, of logs that have nothing in common."""
 SERVO = {"model": "STS3215", "stall_torque": 2.94, "no_load_speed": 4.71, "rated_voltage": 12.0, "supply_voltage": 12.0,
          "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278}
 """Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1);
@@ -80,16 +82,18 @@ class Case:
     moment: float | None = None
     within: float = 0.05
     gains: Sequence[int] = GAINS
-    programmes: Sequence[str] = PROGRAMMES
+    programmes: Sequence[str] = SPLITS["first"]
 
 
-def goals_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
-    """Goals as if they had been sent `shift` [s] earlier, by a clock that runs `rate` times as fast."""
+def commands_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
+    """Goals and the command to let go as if sent `shift` [s] earlier, by a clock that runs `rate` times as fast."""
     def edited(rows: list[Entry]) -> list[Entry]:
         time = np.array([r["timestamp"] for r in rows])
         goal = np.array([r["goal_position"] for r in rows])
-        moved = np.interp(time[0] + (time - time[0]) * rate + shift, time, goal)
-        return [r | {"goal_position": float(g)} for r, g in zip(rows, moved)]
+        at = time[0] + (time - time[0]) * rate + shift
+        enabled = [rows[k]["torque_enable"] for k in np.maximum(np.searchsorted(time, at, side="right") - 1, 0)]
+        moved = np.interp(at, time, goal)
+        return [r | {"goal_position": float(g), "torque_enable": on} for r, g, on in zip(rows, moved, enabled)]
     return edited
 
 
@@ -105,8 +109,8 @@ CASES = (
     Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), moment=1.46192 / 1.12685, within=0.2),
     Case("arm", "arm100_0.741kg", effects=("com_shift", "payload"), moment=0.74437 / 1.12685, within=0.2),
     Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
-    Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
-    Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
+    Case("delay", "arm150_0.741kg", 2, edit=commands_at(0.04), effects=("command_delay",), size=0.04),
+    Case("clock", "arm150_0.741kg", 2, edit=commands_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
     Case("zero", "arm150_0.741kg", 2, edit=turned(3.0), effects=("zero_offset", "ground_tilt"), size=-3.0),
 )
 

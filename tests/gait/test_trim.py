@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.command import refused
+from tests.command import refused, succeeds
 from workbench.files import InputError
 from workbench.gait.evaluate import SEARCH, Evaluator
+from workbench.gait.examine import CertifyOptions
 from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import OptimizeOptions
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.shape import GaitShape
@@ -17,9 +19,10 @@ from workbench.gait.straighten import METRES, Straightener, heading_gain, summar
 from workbench.gait.table import gait_table
 from workbench.gait.trim import turn_in
 from workbench.gait.turning import MOST_TRIM, TurnEstimate, recorded_turn
+from workbench.motion import load_motion
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
-from workbench.robot import EffectSpec, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import Job
 from workbench.simulation.compiled import CompiledJob
 
@@ -94,18 +97,47 @@ def test_a_turn_in_place_has_nothing_to_straighten(machine):
         heading_gain(machine, Request(way="turn"), SHAPE)
 
 
-def test_mocap_of_the_base_shows_what_the_rollout_does(machine, tmp_path):
-    robot = machine.model.with_effects((CROOKED,))
-    table = gait_table(machine, SHAPE)
-    take = CompiledJob(Job(robot, SEARCH, table.commands(8), table.start_seconds + 8 * table.period, 0.3)).take()
+def record(path, robot, commands, seconds):
+    """The base's rigid body of a robot that plays the commands, as Motive would export it."""
+    take = CompiledJob(Job(robot, SEARCH, commands, seconds, 0.3)).take()
     w, x, y, z = take.quat_WB.T  # capture axes: x forward, y up, z right
     asset = next(a for a, link in robot.rigid_bodies.items() if link == robot.base)
     body = BodyTrack(take.p_WB[:, [0, 2, 1]] * [1, 1, -1], np.column_stack([w, x, z, -y]))
-    write_motive(tmp_path / "walk.csv", {asset: body}, 1 / float(np.median(np.diff(take.time))))
+    write_motive(path, {asset: body}, 1 / float(np.median(np.diff(take.time))))
+
+
+def test_mocap_of_the_base_shows_what_the_rollout_does(machine, tmp_path):
+    robot = machine.model.with_effects((CROOKED,))
+    table = gait_table(machine, SHAPE)
+    record(tmp_path / "walk.csv", robot, table.commands(8), table.start_seconds + 8 * table.period)
     seen = turn_in(tmp_path / "walk.csv", machine.model, table.period)
     (walked,) = Evaluator(machine, Request(), (), n_jobs=1).measured([(SHAPE, robot)])
     assert math.degrees(seen.heading) == pytest.approx(math.degrees(drift(Request(), walked)), abs=4)
     assert seen.sd < math.radians(5)
+
+
+@pytest.mark.slow
+def test_the_command_straightens_a_crooked_robot_from_its_recording(machine, tmp_path, capsys, monkeypatch):
+    brief = CertifyOptions(draws=0, checked=0, seconds=2.0, step=2e-3, floor_seconds=0.5, watched=0, trimmed=0, n_jobs=1,
+                           variants=("2 ms",))
+    monkeypatch.setattr("workbench.gait.optimize.options_of", lambda *_: OptimizeOptions(certify=brief))
+    monkeypatch.setattr("workbench.gait.engines.other_engine", lambda: None)
+    model, gait = machine.model, data_file("gaits") / "plan-0.15" / "gait.csv"
+    robot = model.with_effects((CROOKED,))
+
+    def heading_of(motion, name):
+        played = load_motion(motion, model)
+        commands = played.commands(24)
+        record(tmp_path / name, robot, commands, commands.end)
+        return math.degrees(turn_in(tmp_path / name, model, played.as_table().period).heading)
+
+    before = heading_of(gait, "walk.csv")
+    said = succeeds(capsys, "trim", str(tmp_path / "walk.csv"), "--gait", str(gait), "--out", str(tmp_path / "out"))
+    assert f"recorded: {before:+.1f} deg/m" in said
+    assert {"gait.csv", "certificate.json", "report.html"} <= {f.name for f in (tmp_path / "out").iterdir()}
+    after = heading_of(tmp_path / "out" / "gait.csv", "again.csv")
+    assert abs(before) > 20
+    assert abs(after) < abs(before) / 3
 
 
 def test_trim_refuses_a_gait_without_its_certificate(tmp_path, capsys):

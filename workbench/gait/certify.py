@@ -61,7 +61,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
     robots = [request.on_slope(d) for d in draws[:options.draws]]
     groups = _groups(robots)
-    straightener = _straightener(machine, request, table, options) if robots and options.trimmed else None
+    straightener = _straightener(machine, request, table) if robots and options.trimmed else None
     trimmed = _groups(robots[:options.trimmed]) if straightener is not None else []
     variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
     work: list[Work] = [("nominal robot", examiner.nominal, ())]
@@ -108,7 +108,7 @@ def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:
     return [robots[k:k + TOGETHER] for k in range(0, len(robots), TOGETHER)]
 
 
-def _straightener(machine: GaitMachine, request: Request, table: GaitTable, options: CertifyOptions) -> Straightener | None:
+def _straightener(machine: GaitMachine, request: Request, table: GaitTable) -> Straightener | None:
     """What straightens robots that walk this table; None for a gait that cannot be steered."""
     try:
         gain, speed = heading_gain(machine, request, table.shape)

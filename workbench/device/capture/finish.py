@@ -93,7 +93,7 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
             raise InputError(journal, "fewer than two frames before the recording's end")
     bodies = _tracks(frames, content.names, counts.first, max(frames))
     gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
-    problems = _problems(counts, gaps, worst, clock, content, ended)
+    problems = _problems(counts, gaps, worst, clock, ended)
     began = datetime.datetime.fromisoformat(content.head["utc"]) + datetime.timedelta(seconds=first_host - content.head_arrival)
     write_motive(take, bodies, rate, take_name=take.stem, first_frame=0, metadata={
         "Capture Start Time": began.astimezone().strftime("%Y-%m-%d %I.%M.%S.%f")[:-3] + began.astimezone().strftime(" %p")})
@@ -187,7 +187,7 @@ def _clock(measured: list[dict[str, float]], first: float) -> ServerClock:
     return ServerClock(at, float(trip[best].min() / 2), drift)
 
 
-def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: ServerClock, content: _Content, ended: str
+def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: ServerClock, ended: str
               ) -> tuple[str, ...]:
     out = [ended] if ended else []
     if counts.lost or counts.broken:

@@ -121,10 +121,12 @@ class UdpLink:
 
 
 class VirtualLink:
-    """An emulated server in this process; waiting costs virtual time only. delay: of each packet, either way [s]."""
+    """An emulated server in this process; waiting costs virtual time only."""
 
-    def __init__(self, server: VirtualMotive, delay: float = 0.2e-3) -> None:
-        self._server, self._delay, self._now = server, delay, server.started
+    _delay = 0.2e-3  # [s] of each packet, either way
+
+    def __init__(self, server: VirtualMotive) -> None:
+        self._server, self._now = server, server.started
         self._waiting: list[tuple[float, bytes]] = []
 
     @property

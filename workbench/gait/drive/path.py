@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -35,8 +36,8 @@ class WayPath:
             raise InputError(None, f"way-point {int(np.argmin(chords)) + 1} is where the one before it is")
         knots = np.concatenate([[0.0], np.cumsum(chords)])
         straight = [(1, np.array([1.0, 0.0])), (2, np.zeros(2))]
-        free = [(3, np.zeros(2)), (4, np.zeros(2))]
-        spline = make_interp_spline(knots, every, k=5, bc_type=(straight, free))  # type: ignore[arg-type]
+        ends: Any = (straight, [(3, np.zeros(2)), (4, np.zeros(2))])  # the stubs do not know the form with derivatives
+        spline = make_interp_spline(knots, every, k=5, bc_type=ends)
         fine = np.linspace(0.0, knots[-1], max(int(knots[-1] / SPACING), 20))
         self.points = every[1:]
         self.p = np.asarray(spline(fine))

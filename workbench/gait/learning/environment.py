@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class GaitEnv(gymnasium.Env):
     truncated after `options.cycles` cycles. The reward is in `LearningOptions`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(self, family: GaitFamily, robots: Sequence[RobotModel], actions: Kind = "cycle",
                  options: LearningOptions | None = None) -> None:

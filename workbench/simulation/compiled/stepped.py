@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.effects.apply import played, resolved
+from workbench.effects.apply import apply_to_commands, resolved
 from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
@@ -55,7 +55,7 @@ class CompiledSteppedRun:
     def send(self, commands: Commands) -> None:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
         self._sent = followed(self._sent, commands.reordered(self.model.joints), self.time)
-        self._played = played(self._recent(self._sent), self.model)
+        self._played = apply_to_commands(self._recent(self._sent), self.model)
 
     def advance(self, seconds: float) -> None:
         """Advances the run by `seconds`, rounded to whole steps of the log."""
