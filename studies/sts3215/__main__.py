@@ -92,7 +92,7 @@ def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None,
         sizes = ", ".join(f"{k} {_told(e.value)} ({_told(e.low)} to {_told(e.high)})" for k, e in f.parameters.items())
         print(f"    {f.confidence:.2f} {f.effect}: {sizes}", flush=True)
     for t in result.diagnosis.tied:
-        print(f"    {t.confidence:.2f} {t.said()}", flush=True)
+        print(f"    {t.confidence:.2f} {t.in_words()}", flush=True)
     return outcome
 
 

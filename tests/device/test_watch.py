@@ -120,7 +120,7 @@ def test_a_late_answer_is_held_up_too():
     assert w.reaction is None
     w.answered(1, 0.59, FINE, ())
     assert w.reaction.how == "neutral"
-    assert "could not be read for 0.3 s" in w.reaction.reason
+    assert w.reaction.reason.startswith("servo 1 (one): could not be read for 0.3 s")
 
 
 def test_a_servo_is_unheard_from_its_first_question_on_where_the_motion_has_not_begun():
@@ -130,6 +130,71 @@ def test_a_servo_is_unheard_from_its_first_question_on_where_the_motion_has_not_
     assert (w.heard(7), w.reaction) == (5.0, None)
     w.silent(7, 5.4)
     assert w.reaction == Reaction("neutral", "servo 7: silent for 0.4 s")
+
+
+def test_every_servo_is_checked_for_silence():
+    w = watch()
+    w.answered(1, 0.29, FINE, ())
+    w.check(0.31)
+    assert w.reaction.reason.startswith("servo 2 (two): could not be read")
+
+
+def test_the_first_answer_of_a_servo_is_not_late_where_the_motion_has_not_begun():
+    w = Watch(AX, {}, {})
+    w.answered(7, 5.0, FINE, ())
+    assert (w.heard(7), w.reaction) == (5.0, None)
+
+
+def asked(answers: str, options=None) -> Watch:
+    """A servo asked every 40 ms: answered (a), not answered (-), or with an answer that cannot be true (i)."""
+    w = watch(options=options)
+    for k, how in enumerate(answers):
+        time = 0.04 * (k + 1)
+        w.answered(2, time, FINE, ())
+        if how == "a":
+            w.answered(1, time, FINE, ())
+        elif how == "i":
+            w.impossible(1, time)
+        else:
+            w.silent(1, time)
+    return w
+
+
+@pytest.mark.parametrize(("answers", "unsteady"), [
+    ("a-a-a-a", False), ("a-a-a-a-", True), ("a---aa", False), ("a---aa-", True), ("----a", True), ("aaa----", False),
+    ("iiii", False), ("iiiia", True), ("aaaa---", False), ("-aaaaaa-a-a-", False)])
+def test_a_servo_that_answers_too_few_questions_may_share_its_id(answers, unsteady):
+    """Four of the latest within 0.3 s, and half of them, have no answer that can be true; one that has gone silent is left to
+    the check for silence."""
+    w = asked(answers)
+    assert (w.doubted == 1) is unsteady
+    assert (w.reaction is not None) is unsteady
+    if unsteady:
+        assert w.reaction.how == "neutral"
+        assert "does another servo have its ID" in w.reaction.reason
+
+
+@pytest.mark.parametrize(("answers", "unsteady"), [("-a-a-a", True), ("aaaa-a-", False), ("aaa-a--", False), ("aa-a-a-", False),
+                                                   ("aa-a--", True)])
+def test_failures_must_be_a_share_of_all_questions_too(answers, unsteady):
+    assert (asked(answers, WatchOptions(failures=3)).doubted is not None) is unsteady
+
+
+def test_the_questions_of_a_motion_are_counted_from_its_beginning():
+    w = asked("a---")
+    w.begin(0.17)
+    w.silent(1, 0.2)
+    w.answered(1, 0.21, FINE, ())
+    assert w.doubted is None
+
+
+def test_on_the_way_back_no_servo_is_doubted():
+    w = watch()
+    w.only_release()
+    for k in range(4):
+        w.silent(1, 0.01 * k)
+    w.answered(1, 0.05, FINE, ())
+    assert (w.doubted, w.reaction) == (None, None)
 
 
 def test_on_the_way_back_only_reasons_to_release_count():

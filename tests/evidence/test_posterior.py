@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from tests.evidence.linear import candidate
 from workbench.effects.registry import effect_named
@@ -68,6 +69,12 @@ def test_the_rivals_probability_is_summed_over_models_that_lack_the_effect():
     assert (rival, probability) == (name(WET), pytest.approx(0.5 / 2.4))
 
 
+def test_the_probabilities_of_an_alternative_add_up_before_it_is_compared_with_others():
+    fits = [model(0.0, DRY), model(math.log(0.25), LOADED), *[model(math.log(0.2), WET, e) for e in (PLAY, SPRING)]]
+    assert posterior_of(fits, OPTIONS).rival(name(DRY)) == (name(WET), pytest.approx(0.4 / 1.65))
+    assert posterior_of([*fits[:2], model(math.log(0.2), WET)], OPTIONS).rival(name(DRY))[0] == name(LOADED)
+
+
 def test_an_effect_of_the_best_model_is_no_rival_of_another():
     p = posterior_of([model(0.0, DRY, PLAY), model(math.log(0.5), PLAY), model(math.log(0.1), PLAY, LOADED)], OPTIONS)
     assert p.rival(name(DRY)) == (name(LOADED), pytest.approx(0.1 / 1.6))
@@ -107,6 +114,7 @@ def test_a_number_at_the_end_of_its_reach_refutes_the_effect(share, ends):
     said = at_their_end(start(()).with_effect(SPRING, there), [pool, PLAY])
     assert (SPRING in said) is ends
     if ends:
+        assert said[SPRING].unit == SPRING.parameters[0].unit
         assert (said[SPRING].parameter, said[SPRING].value) == (SPRING.parameters[0].name, pytest.approx(share * 4.0))
 
 
@@ -114,6 +122,23 @@ def test_effects_without_a_reach_or_outside_the_pool_go_as_far_as_they_like():
     h = start(()).with_effect(SPRING, [1e9] + [0.0] * (SPRING.size - 1))
     assert at_their_end(h, [SPRING]) == {}
     assert at_their_end(h, []) == {}
+
+
+@pytest.mark.parametrize(("effect", "places", "neutral", "values", "reach", "parameter", "value"), [
+    ("ground_tilt", (), (0.0, 0.0), (1.0, -3.0), 3.0, "left", -3.0),
+    ("friction_asymmetry", ("j",), (1.0,), (0.5,), math.log(2.0), "ratio", 0.5),
+    ("friction_asymmetry", ("j",), (1.0,), (0.5,), math.log(2.0) + 0.02, None, None),
+    ("payload", ("link",), (0.0,) * 4, (0.02, 0.03, 0.0, 0.04), 0.05, "position", 0.05),
+    ("payload", ("link",), (0.0,) * 4, (0.05, 0.01, 0.0, 0.0), 0.05, "mass", 0.05),
+    ("com_shift", ("link",), (0.01, 0.0, 0.0), (0.05, 0.0, 0.0), 0.04, "offset", 0.05),
+    ("com_shift", ("link",), (0.01, 0.0, 0.0), (0.05, 0.0, 0.0), 0.05, None, None)])
+def test_each_kind_of_number_has_its_own_distance_from_neutral(effect, places, neutral, values, reach, parameter, value):
+    """The sign of a number, the logarithm of a ratio, the length of a vector; all parameters of an effect are looked at."""
+    c = Candidate.of(effect_named(effect), places, neutral)
+    x = least_squares(lambda x: np.subtract(c.values(x), values), np.full(c.size, 0.5), x_scale="jac").x
+    assert c.values(x) == pytest.approx(values, abs=1e-6)
+    said = at_their_end(start(()).with_effect(c, x), [replace(c, reach=reach)])
+    assert [(r.parameter, pytest.approx(r.value, abs=1e-6)) for r in said.values()] == ([(parameter, value)] if parameter else [])
 
 
 def test_of_a_vector_the_length_is_compared():

@@ -75,3 +75,11 @@ def test_a_size_is_known_no_better_than_the_torques_that_do_the_same():
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.2 * 3.0, rel=1e-3)
     assert np.sqrt(covariance[1, 1]) == pytest.approx(1e-3)
     assert tie.covariance(vague, size) == pytest.approx(vague)
+
+
+def test_a_small_size_is_widened_along_its_own_direction_too():
+    here, f, c = fitted(sd=0.06, size=0.5)
+    tie, size = as_torque(here, OPTIONS, f, c), f.hypothesis.theta[f.hypothesis.slices()[0]]
+    covariance = tie.covariance(1e-6 * np.eye(c.size), size)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.06 / 0.05 * 0.5, rel=1e-2)
+    assert np.sqrt(covariance[1, 1]) == pytest.approx(1e-3)

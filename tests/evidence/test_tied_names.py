@@ -76,8 +76,8 @@ def test_a_known_weight_in_some_takes_leaves_torque_as_the_only_cause():
     assert tied.torque_behind == 0.0
     assert min(n.behind for n in tied.names) > OPTIONS.occam
     assert tied.competitive == ()
-    assert "leave one: all torques of the servo times 1.66" in tied.said()
-    assert "`load:`" not in tied.said()
+    assert "leave one: all torques of the servo times 1.66" in tied.in_words()
+    assert "`load:`" not in tied.in_words()
 
 
 def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
@@ -89,7 +89,7 @@ def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
     assert said.ratio.low < 1.3 < said.ratio.high
     assert said.confidence > 0.8
     assert best.log_posterior > fit.log_posterior
-    assert "--model" not in said.said()
+    assert "--model" not in said.in_words()
 
 
 def test_names_that_fits_do_not_separate_share_the_ties_probability():
@@ -118,6 +118,6 @@ def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
     names = (TiedName("payload", ("arm",), {}, "arm carries 200 g more.", 0.0),
              TiedName("parallel_spring", (JOINT,), {}, "A spring pulls.", 40.0))
     tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False, OPTIONS.occam)
-    assert "arm carries 200 g more" in tie.said()
-    assert "spring" not in tie.said()
+    assert "arm carries 200 g more" in tie.in_words()
+    assert "spring" not in tie.in_words()
     assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]

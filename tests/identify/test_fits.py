@@ -15,12 +15,12 @@ from workbench.identify.fitting.levenberg_marquardt import fit_blocks, together
 from workbench.identify.ledger import layer_of, ledger
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass, SwungMass
-from workbench.identify.problem import ratios, smoothed
+from workbench.identify.problem import ratios, running_means
 from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection import forward
 from workbench.identify.selection.options import FORWARD
-from workbench.identify.selection.screening import tried
+from workbench.identify.selection.screening import fit_groups
 
 
 def test_residuals_are_as_large_as_noise_where_nothing_is_hidden(tmp_path):
@@ -93,8 +93,8 @@ def test_layers_are_told_by_where_a_channel_is_ill():
 
 def test_running_means_of_noise_stay_one_and_those_of_an_offset_grow():
     noise = np.random.default_rng(0).normal(size=(4000, 1))
-    assert np.std(smoothed(noise, 8)) == pytest.approx(1.0, abs=0.1)
-    assert np.mean(smoothed(np.ones((100, 1)), 9)[20:-20]) == pytest.approx(3.0)
+    assert np.std(running_means(noise, 8)) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(running_means(np.ones((100, 1)), 9)[20:-20]) == pytest.approx(3.0)
 
 
 def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_its_size(worn):
@@ -103,7 +103,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name in names]
     groups = [[c for c in pool if c.name == name] for name in sorted(names)]
     assert all(len(g) == 3 for g in groups)
-    trials = tried(search, nominal, groups, dict.fromkeys(range(len(groups)), (0,)), lambda share: None)
+    trials = fit_groups(search, nominal, groups, dict.fromkeys(range(len(groups)), (0,)), lambda share: None)
     best = max(trials, key=lambda t: t.gain["choose"])
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)

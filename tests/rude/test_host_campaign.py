@@ -23,8 +23,8 @@ FOUND = [
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
 lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
-program's questions in the log; torque that stayed on where a start failed; two servos of one ID that were taken for one as long
-as an answer could be read now and then, and whose positions were mixed in the log."""
+program's questions in the log; torque that stayed on where a start failed; two servos of one ID that were taken for one as
+long as an answer could be read now and then, and whose positions were mixed in the log."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

@@ -78,7 +78,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")
     for tied in diagnosis.tied:
-        print(f"  {tied.said()}")
+        print(f"  {tied.in_words()}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
     for unknown in diagnosis.unknown_torques:

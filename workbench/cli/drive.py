@@ -44,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--certify", action="store_true", help="certify the gait's turns over random robots, as --port requires, "
                         "and write family.json into the gait's folder; no way-points")
     parser.add_argument("--avoid", metavar="X,Y,R", type=_disc, action="append", default=[],
-                        help="a disc on the floor to walk around, centre and radius [m]; may be repeated")
+                        help="a disc on the floor to walk around, centre and radius [m]; repeatable")
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")
     truth.add_argument("--draw", type=int, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
@@ -61,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--image", metavar="FILE", help=f"with --port {VIRTUAL}: the program in the emulated CM-530")
     parser.add_argument("--motive", metavar="HOST", help="with --port: computer that runs Motive")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
-    parser.add_argument("--force", action="store_true", help="with --port: drive although the gait's certificate does not hold")
+    parser.add_argument("--force", action="store_true", help="with --port: drive even if the gait's certificate is not valid")
     add_out(parser, default="runs/drive")
     parser.set_defaults(run=run)
 

@@ -12,7 +12,7 @@ import numpy as np
 from workbench.compare.comparison import align
 from workbench.compare.options import FILES
 from workbench.compare.session import Session, TakeSpec
-from workbench.effects.apply import seen
+from workbench.effects.apply import apply_to_measurement
 from workbench.files import InputError
 from workbench.files.errors import MistypedError
 from workbench.motion.commands import Commands
@@ -78,7 +78,7 @@ class RegisteredTake(ReadTake):
         if not self.recorded.zeroed:
             return align(rollout.as_logged(), self.recorded)
         model = model or self.model
-        return observe(rollout, seen(self.measurement, model), model, self.recorded.time)[0]
+        return observe(rollout, apply_to_measurement(self.measurement, model), model, self.recorded.time)[0]
 
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:

@@ -13,7 +13,7 @@ import numpy as np
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
 from workbench.files import InputError
 from workbench.robot import JointFrame, Kinematics
-from workbench.robot.model_source import named
+from workbench.robot.model_source import user_file
 from workbench.types import Array
 
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
@@ -38,7 +38,7 @@ class SdfRobot:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path, self.source = path, named(path)
+        self.path, self.source = path, user_file(path)
         ElementTree.register_namespace("drake", "http://drake.mit.edu")
         self.root = deepcopy(_parsed(path, path.stat().st_mtime_ns))
         model = self.root.find("model")

@@ -117,12 +117,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
-        before, found = found.best, refined(evaluator, found, options.refine, progress)
-        plans = plans.with_refined(before.shape, found.best.shape)
+        before, found = found, refined(evaluator, found, options.refine, progress)
+        plans = plans.with_refined(before, found)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
             "ensemble": Path(ensemble.source).name, "ensemble_sha256": ensemble.sha256, "method": options.method,
-            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before,
+            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before.best,
             "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
@@ -142,6 +142,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
                           progress)
         for k, walked in enumerate(tried):
             if not walked.good:
+                progress(f"finalist {k + 1} is refused: {binding(walked.margins)}", None)
                 refused.append(walked)
                 continue
             certified.append(examine(walked, options.certify, k + 1))

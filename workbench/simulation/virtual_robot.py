@@ -23,7 +23,7 @@ from workbench.device.virtual import (
     VirtualPort,
     VirtualServo,
 )
-from workbench.effects.apply import physics_of, played, resolved, seen
+from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of, resolved
 from workbench.effects.base import Effect
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -144,7 +144,7 @@ class VirtualRobot:
 
     def controller(self, commands: Commands) -> Commands:
         """A motion's commands after the robot's controller: delayed, dropped or mixed up by the model's effects."""
-        return played(commands.reordered(self.model.joints), self.model)
+        return apply_to_commands(commands.reordered(self.model.joints), self.model)
 
     def scene(self, started: float, seed: int = 0) -> tuple[tuple[str, ...], Scene, float, float]:
         """What cameras saw from the rest before the first pose on: names of the bodies, their poses by the time since then, when
@@ -158,7 +158,7 @@ class VirtualRobot:
         take = self.body.take(started - let_go / SECOND)
         begin = max(take.time[0], -0.9)
         rest = take.resampled(take.time[take.time >= begin - 1e-9])
-        measurement = seen(self._measurement(rest, rng), self.model)
+        measurement = apply_to_measurement(self._measurement(rest, rng), self.model)
         times = rest.time - rest.time[0]
         _, tracks = observe(rest, measurement, self.model, times)
         names = tuple(tracks)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.identify.small import fit_of
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
@@ -137,7 +138,7 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
 def test_what_fixed_base_takes_identified_is_judged_on_them_alone(monkeypatch):
     monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
     c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
-    fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
+    fit = fit_of((), {0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
         search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
@@ -152,7 +153,7 @@ def test_what_floating_base_takes_identify_of_a_joint_is_judged_by_its_own_gap_a
         return Candidate.of(known_effects()[name], (joint,), (0.0,) * len(known_effects()[name].parameters))
 
     own_effect, other = of("coulomb_friction", "two"), of("backlash", "three")
-    fit = SimpleNamespace(residuals={0: np.ones(1)}, effects=(own_effect, other))
+    fit = fit_of((own_effect, other), {0: np.ones(1)})
     trial = CandidateFit(own_effect, np.ones(1), {}, None)
     for own, elsewhere, share in ((1.0, 0.6, 0.8), (0.0, 0.6, 0.6), (0.2, 0.6, 0.6)):  # a zero shows in other joints alone
         shares = {("two", ()): own, (None, ()): 0.2, (None, ("three",)): elsewhere}
@@ -167,7 +168,7 @@ def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
     def accepted(name, *where):
         return (CandidateFit(Candidate.of(known_effects()[name], where, (0.0,)), np.ones(1), {}, None),)
 
-    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), SimpleNamespace()
+    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), fit_of()
     rounds = [SelectionStep("nominal", (), clock), SelectionStep("nominal", (), frame)]
     assert before_rough(rounds, now) is now
     assert before_rough([*rounds, SelectionStep("seen rightly", (), sag)], now) == "seen rightly"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
+from tests.identify.small import search_on
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
@@ -49,9 +50,9 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
 
 
 def test_a_walk_and_what_one_explains_are_left_to_single_effects():
-    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: True))
+    search = search_on("free")
     assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
-    held = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: False))
+    held = search_on("fixed")
     assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
     assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
 

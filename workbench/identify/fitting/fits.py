@@ -241,7 +241,7 @@ class Search:
         return {use: self.evaluator.cost(residuals, use) for use in ("fit", "choose", "validate")}
 
 
-def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
+def gain_between(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
     """Reduction of chi squared from one fit to another, in one use of some takes."""
     was, now = (evaluator.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
     return was - now
@@ -249,7 +249,7 @@ def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence
 
 def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
     """Whether the fixed-base takes contradict a fit, compared with another: by more than `against` of chi squared."""
-    return gained(search.evaluator, fit, other, search.fixed_base, "fit") > FIT.against
+    return gain_between(search.evaluator, fit, other, search.fixed_base, "fit") > FIT.against
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:

@@ -158,7 +158,7 @@ class Rejected:
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
-        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.said()}
+        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.in_words()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
 
@@ -200,7 +200,7 @@ class Unexplained:
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
-                "description": self.description.said()}
+                "description": self.description.in_words()}
 
 
 @dataclass(frozen=True)

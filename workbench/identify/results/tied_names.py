@@ -59,7 +59,7 @@ class GravityOverTorque:
         """Whether other torques of the servo are a possible cause."""
         return self.torque_behind < self.window
 
-    def said(self) -> str:
+    def in_words(self) -> str:
         """For a person: the ratio, everything that it may come from, and how to find out."""
         torque = f"all torques of the servo times {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
         causes = [(torque, self.torque_behind)] if self.may_be_torque else []
@@ -75,4 +75,4 @@ class GravityOverTorque:
         """As findings.json has it."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
                 "confidence": float(self.confidence), "torque_behind": round(self.torque_behind, 1),
-                "names": [n.to_json() for n in self.names], "evidence": self.said()}
+                "names": [n.to_json() for n in self.names], "evidence": self.in_words()}

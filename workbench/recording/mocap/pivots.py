@@ -30,7 +30,7 @@ class Pivots:
 
 def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, rest_pose: Mapping[str, float],
                 rest_rotation: Array) -> Pivots:
-    """Linear least squares of all pivots together (3 unknowns each), through the kinematic tree.
+    """Linear least squares for every pivot at once (3 unknowns each), through the kinematic tree.
 
     With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame,
     which is linear in all pivots. A pivot that turns with no joint, above all across the machine, is determined weakly or not at

@@ -15,7 +15,7 @@ from workbench.recording.servo_log.let_go import lets_go
 from workbench.recording.servo_log.no_answer import without_no_answer
 from workbench.recording.servo_log.relative import relative_goals
 from workbench.recording.servo_log.repeats import without_repeats
-from workbench.recording.servo_log.unlike import rounded, unlike
+from workbench.recording.servo_log.unlike import none_follows, rounded, unlike
 from workbench.recording.servo_log.zero_shift import zero_shifts
 
 
@@ -65,6 +65,9 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
             log, said = _zeroed(channels, log)
             said += _released(channels, recording, log)
         lines += said or [f"position.{joint}: {text}" for text in list(held_back(log)) or unlike(log)]
+    if not any("does not follow" in text for text in lines):
+        alone = none_follows({j: log for j, log in logs.items() if j not in no_goals})
+        lines += [alone] if alone else []
     for joint in no_goals:
         channels[f"position.{joint}"] = np.full(len(recording.time), np.nan)
     return Mended(replace(recording, channels=channels), tuple(lines), frozenset(no_goals))

@@ -14,10 +14,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class ChannelChecks:
-    """amperes, celsius: more than a hobby servo takes [A] and stands [deg C]. turns_off: a joint that moves so far while its
-    torque is said to be off in every row [deg], and whose position the goals explain to `follows`, is on. faster: how many times
-    a joint exceeds the moving speed that its goals have. opposite: correlation of duty with the way from position to goal,
-    below which it has the other sign. moves: least motion that tells [deg]. fewest: least number of rows."""
+    """amperes, celsius: no hobby servo takes more [A] or stands more [deg C]. turns_off: a joint that moves so far while its
+    torque is said to be off in every row [deg], and whose position the goals explain to `follows`, has it on. faster: a joint
+    that exceeds the moving speed of its goals so many times. opposite: correlation of duty with the distance from position to
+    goal, below which it has the other sign. moves: least motion that tells [deg]. fewest: least number of rows."""
 
     amperes: float = 20.0
     celsius: float = 120.0

@@ -64,7 +64,8 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
     if len(time) < 3:
         return replace(recording, problems=tuple(problems))
-    exchanged = dict(reversed_roles(recording))
+    exchanged = {j: text for j, text in reversed_roles(recording)
+                 if _shift_of_equals(channels[f"goal.{j}"], channels[f"position.{j}"], checks) is None}
     problems += exchanged.values()
     for joint in recording.joints:
         name = f"position.{joint}"
@@ -120,11 +121,14 @@ def _in_another_unit(goal: Array) -> bool:
 def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
     steps = np.diff(r.time)
     middle = float(np.median(steps))
-    if middle > c.slow:
+    if np.all(steps == 1.0):
+        yield f"time: rows are 1 s apart, {r.time[-1] - r.time[0]:g} s in all: is it the number of the row, or of the frame?"
+    elif middle > c.slow:
         unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
         yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
     elif middle < c.fast:
-        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in minutes?")
+        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in "
+               f"{'minutes' if 60 * middle > c.fast else 'hours'}?")
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))

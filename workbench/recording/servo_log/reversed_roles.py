@@ -15,11 +15,13 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class RoleChecks:
-    """unexplained: share of the goal's variance that the position, delayed and smoothed as by a servo, leaves at most; better:
-    and so many times less than the goal leaves of the position's. goes: least motion of both [deg]."""
+    """unexplained: largest share of the goal's variance that the position, delayed and smoothed as by a servo, does not explain;
+    better: and so many times less than the goal does not explain of the position's. steps: the positions change in at most so
+    many times the rows in which the goals do. goes: least motion of both [deg]."""
 
     unexplained: float = 0.1
     better: float = 4.0
+    steps: float = 0.5
     goes: float = 5.0
 
 
@@ -27,14 +29,19 @@ ROLES = RoleChecks()
 
 
 def reversed_roles(r: Recording, c: RoleChecks = ROLES) -> Iterator[tuple[str, str]]:
-    """Name and a line of each joint whose goals follow its positions and not the other way round."""
+    """Name and a line of each joint whose goals follow its positions and not the other way round, where the positions
+    are set points, which stand and then step; of smooth ones, a lead is reported instead (`lead`)."""
     for joint, log in joint_logs(r).items():
-        if np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) < c.goes:
+        if np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) < c.goes or not _steps(log, c):
             continue
         answer = _unexplained(log, log.position, log.goal)
         if answer < c.unexplained and c.better * answer < _unexplained(log, log.goal, log.position):
             yield joint, (f"goal.{joint}: follows position.{joint}, as only a position follows its goal: are the two columns "
                           "exchanged? The joint's evidence is left out")
+
+
+def _steps(log: JointLog, c: RoleChecks) -> bool:
+    return bool(np.mean(np.diff(log.position) != 0) < c.steps * np.mean(np.diff(log.goal) != 0))
 
 
 def _unexplained(log: JointLog, cause: Array, effect: Array) -> float:

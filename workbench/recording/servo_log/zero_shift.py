@@ -14,19 +14,19 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class ShiftChecks:
-    """least: of a step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from theirs
-    in the `near` rows on each side. beyond: or so many times all steps of the log but a hundredth. alike: largest difference, in
-    shares of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
-    within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart are not used [s]. pause: nor
-    steps across rows that are so many medians apart, or beside them. explained: share of the position's variance that the goals
-    must explain. doubt: of two levels, the one nearer to the goals counts as the right one, the first where they are equally
-    near to that share."""
+    """least: smallest step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from
+    theirs in the `near` rows on each side. beyond: or so many times 99 % of the log's steps. alike: largest difference, as a
+    share of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
+    within `before` explains it [s]. rows: fewest in a stretch. slowest: rows further apart are not used [s]. pause: steps across
+    or next to rows that are so many medians apart are not used. explained: share of the position's variance that the goals must
+    explain. doubt: of two levels, the one nearer to the goals counts as the right one, the first where they are equally near to
+    that share."""
 
     least: float = 1.0
     times: float = 4.0
     near: int = 8
     beyond: float = 1.5
-    alike: float = 0.35
+    agreement: float = 0.35
     goal: float = 0.4
     before: float = 0.3
     rows: int = 5
@@ -67,7 +67,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     for i, jump in enumerate(jumps):
         if min(edges[i + 1] - edges[i], edges[i + 2] - edges[i + 1]) < c.rows:
             return none, []
-        if abs(middle[i + 1] - middle[i] - jump) > c.alike * abs(jump):
+        if abs(middle[i + 1] - middle[i] - jump) > c.agreement * abs(jump):
             return none, []
     true = _true_level(level, middle, fit.offset, c)
     off = np.repeat(level - level[true], np.diff(edges))

@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.math import RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from workbench.effects.apply import Physics, physics_of, played
+from workbench.effects.apply import Physics, apply_to_commands, physics_of
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
@@ -121,7 +121,7 @@ class CompiledJob:
     def _plan(self) -> _Plan:
         job = self.job
         sent = None if job.commands is None else job.commands.reordered(self.model.joints)
-        commands = played(sent, self.model) if sent is not None and self.physics.retimed else sent
+        commands = apply_to_commands(sent, self.model) if sent is not None and self.physics.retimed else sent
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")
