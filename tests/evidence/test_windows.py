@@ -7,7 +7,6 @@ import pytest
 
 from tests.servo_rig import rig_model
 from workbench.identify.rollouts.windows import recorded_states, states_at
-from workbench.motion.commands import Commands
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, ServoConstants
