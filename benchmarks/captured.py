@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def _of_joints(take: Take, joints: tuple[str, ...]) -> Take:
     return replace(take, joints=joints, q=take.q[:, columns], v=take.v[:, columns], off_axis=take.off_axis[:, columns])
 
 
-def captured_take(base: str, length: float, without: tuple[str, ...] = ()) -> TakeEvidence:
+def captured_take(base: Literal["free", "fixed"], length: float, without: tuple[str, ...] = ()) -> TakeEvidence:
     """A take of the puppy's walk of so many seconds, as its own simulation shows it to cameras that stand askew. Joints that no
     camera sees are left out; they are kept where further bodies are not tracked (`without`, assets)."""
     model = puppy_model()

@@ -109,7 +109,8 @@ def _options(args: argparse.Namespace, model: RobotModel, request: Request) -> O
         return options
     if args.method == "plan":
         raise InputError(None, "--start with --method plan: expected a method that searches")
-    return replace(options, given=(*options.given, read_shape(args.start)), planned=False, budget=replace(options.budget, seeds=0))
+    return replace(options, given=(*options.given, read_shape(args.start)), planned=False,
+                   budget=replace(options.budget, seeds=0))
 
 
 def _request(args: argparse.Namespace, model: RobotModel) -> Request:

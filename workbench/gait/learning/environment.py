@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class GaitEnv(gymnasium.Env):
     truncated after `options.cycles` cycles. The reward is in `LearningOptions`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(self, family: GaitFamily, robots: Sequence[RobotModel], actions: Kind = "cycle",
                  options: LearningOptions | None = None) -> None:
@@ -74,7 +74,7 @@ class GaitVectorEnv(VectorEnv):
     """Many robots at once, each as in `GaitEnv`; the simulations run in threads. A robot whose episode has ended begins a new one
     with the next step, whose action is not played (`AutoresetMode.NEXT_STEP`)."""
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(self, num_envs: int, family: GaitFamily, robots: Sequence[RobotModel], actions: Kind = "cycle",
                  options: LearningOptions | None = None, threads: int = 2) -> None:

@@ -28,9 +28,6 @@ from workbench.simulation.compiled.turns import joint_turns
 from workbench.simulation.job import Job
 from workbench.types import Array
 
-KEPT = 32
-"""Robots and sets of tracked bodies whose joints are kept."""
-
 
 class Rollout(NamedTuple):
     """A job, the take that it imitates, and the robot as cameras observe it: some effects change the measurement alone."""
@@ -126,15 +123,17 @@ def _compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
 _joints: OrderedDict[object, tuple[Kinematics, list[SeenJoint]]] = OrderedDict()
 
 
-def _looked_at(e: TakeEvidence, model: RobotModel) -> list[SeenJoint]:
-    """Joints between bodies that cameras track; found once for the same robot and bodies, whatever its effects."""
+def _looked_at(e: TakeEvidence, model: RobotModel, kept: int = 32) -> list[SeenJoint]:
+    """Joints between bodies that cameras track; found once for the same robot and bodies, whatever its effects. kept: robots and
+    sets of tracked bodies whose joints are remembered."""
     kinematics, assets = model.kinematics, tuple(e.take.measurement.pivots)
     key = (id(kinematics), tuple(model.rigid_bodies.items()), model.base, assets, e.take.spec.base)
-    if key not in _joints:
-        _joints[key] = (kinematics, seen_joints(assets, model, e.take.spec.base)[0])  # held, so that the id stays its own
-        while len(_joints) > KEPT:
+    found = _joints.get(key)
+    if found is None:  # with the kinematics, so that its id stays its own
+        found = _joints[key] = (kinematics, seen_joints(assets, model, e.take.spec.base)[0])
+        while len(_joints) > kept:
             _joints.popitem(last=False)
-    return _joints[key][1]
+    return found[1]
 
 
 def _body(e: TakeEvidence, model: RobotModel, m: Measurement, bodies: SeenBodies, assets: list[str], frame: Array) -> Array:
