@@ -81,7 +81,8 @@ class EvidenceOptions:
     stick and slip, fits of one model end up to 20 nats apart, and an effect would win only for lack of a better plain fit. beam:
     states that are extended, and single-effect moves fitted for each; refined: fitted moves of one or two effects, led of
     them sharing their first effect; paired: best moves that are also predicted in pairs. most: effects of one joint. seconds: of
-    all takes together that the search uses, from their beginnings; the last fit uses everything. most_work [s]: of a puppy's
+    all takes together that the search uses, from their beginnings; finished: of all takes together that the last
+    fit uses, twice as long, as its rollouts have a finer step. most_work [s]: of a puppy's
     rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one
     processor, several times the cost of twelve servo logs.
 
@@ -119,6 +120,7 @@ class EvidenceOptions:
     grown: float = 1.5
     far: float = 3.0
     seconds: float = 100.0
+    finished: float = 200.0
     most_work: float = 2e6
     occam: float = 7.0
     veto: float = 3.0
