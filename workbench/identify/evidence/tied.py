@@ -31,7 +31,7 @@ TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_frict
 @dataclass(frozen=True)
 class AsTorque:
     """An effect compared with a change of the servo's torque scale. by: the change of its logarithm that resembles the effect
-    most; similarity: the share of the effect's response that this change reproduces; share: probability that it is the effect, where
+    most; similarity: the share of the effect's response that this change reproduces; share: probability of the effect, where
     both explain the same; known: standard deviation of the logarithm of the servo's common torque scale in the prior."""
 
     by: float
