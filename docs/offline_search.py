@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 FETCHED = '<script src="https://unpkg.com/iframe-worker/shim"></script>'
-"""What the offline plugin writes into each page."""
+"""The script of another server that the offline plugin puts into each page."""
 SCRIPT = """<script>
 if (location.protocol === "file:") {
   window.IFrameWorker = window.Worker = class extends EventTarget {

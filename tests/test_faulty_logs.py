@@ -1,4 +1,4 @@
-"""Sessions with a faulty log: what is set aside is said, and the hidden friction is named all the same."""
+"""Sessions with a faulty log: the excluded readings are reported, and the hidden friction is named all the same."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def torque_gap(log: TorqueLog, model: RobotModel, link: str | None = None) -> To
 
 
 def compared(logs: Mapping[str, TorqueLog], gaps: Mapping[str, TorqueGap], model: RobotModel) -> str:
-    """By how much the second of two logs carries more than the first, both weighed on the link that explains the larger gap:
+    """The additional load of the second of two logs against the first, in a sentence, both weighed on the link that explains the larger gap:
     errors of the model, equal in both, cancel. Empty for one log, or where neither shows a load."""
     if len(logs) != 2:
         return ""
