@@ -1,4 +1,4 @@
-"""The notebook of the documentation: its cells run in order, and show what they promise."""
+"""Runs the cells of the documentation's notebook in order, and checks the errors that it prints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOTEBOOK = Path(__file__).parents[2] / "docs" / "examples" / "notebook" / "tutor
 
 
 def _shown(source: str, names: dict[str, Any]) -> Any:
-    """Runs a cell; what a notebook would show of it: the value of an expression in its last line."""
+    """Runs a cell; returns its output in a notebook, the value of an expression in its last line."""
     tree = ast.parse(source, str(NOTEBOOK))
     last = tree.body[-1]
     if not isinstance(last, ast.Expr):
