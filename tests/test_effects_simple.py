@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from workbench.effects.apply import physics_of, played, seen
+from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of
 from workbench.effects.base import Effect, si_values
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
 from workbench.files import InputError
@@ -98,7 +98,7 @@ def test_effects_add_up_in_their_order(nominal):
 
 
 def test_a_delay_of_all_moves_every_time(commands):
-    late = played(commands, with_effect("command_delay", delay=0.03))
+    late = apply_to_commands(commands, with_effect("command_delay", delay=0.03))
     np.testing.assert_allclose(late.times, commands.times + 0.03)
     assert late.end == pytest.approx(0.63)
     np.testing.assert_array_equal(late.goals, commands.goals)
@@ -107,7 +107,7 @@ def test_a_delay_of_all_moves_every_time(commands):
 @pytest.mark.parametrize("delay", [0.03, 0.1, 0.5])
 def test_a_delay_of_one_joint_moves_its_goals_alone(commands, delay):
     """Also where it falls on another command (0.1) or is longer than the first dwells (0.5)."""
-    late = played(commands, with_effect("command_delay", "flm", delay=delay))
+    late = apply_to_commands(commands, with_effect("command_delay", "flm", delay=delay))
 
     def goal(c: Commands, t: float, column: int) -> float:
         sent = np.searchsorted(c.times, t, side="right") - 1
@@ -127,32 +127,32 @@ def test_one_joint_may_be_later_than_all_are(commands):
     joint = 0.3 - 0.2  # another command's time, but for rounding
     both = PUPPY.with_effects((EffectSpec("command_delay", ("flm",), {"delay": joint}),
                                EffectSpec("command_delay", (), {"delay": 0.4})))
-    late = played(commands, both)
+    late = apply_to_commands(commands, both)
     assert np.diff(late.times).min() > 1e-6
     assert late.end == pytest.approx(0.6 + joint + 0.4)
 
 
 def test_clock_rate_stretches_times(commands):
-    slow = played(commands, with_effect("clock_rate", ratio=1.02))
+    slow = apply_to_commands(commands, with_effect("clock_rate", ratio=1.02))
     np.testing.assert_allclose(slow.times, commands.times * 1.02)
     assert slow.end == pytest.approx(0.6 * 1.02)
 
 
 def test_timing_drift_loses_the_same_at_each_pose(commands):
-    late = played(commands, with_effect("timing_drift", per_pose=0.004))
+    late = apply_to_commands(commands, with_effect("timing_drift", per_pose=0.004))
     np.testing.assert_allclose(late.times, commands.times + 0.004 * np.arange(4))
     assert late.end == pytest.approx(0.6 + 4 * 0.004)
 
 
 def test_a_dropped_command_keeps_the_pose_before(commands):
-    all_missed = played(commands, with_effect("dropped_command", "flm", probability=1.0))
+    all_missed = apply_to_commands(commands, with_effect("dropped_command", "flm", probability=1.0))
     np.testing.assert_array_equal(all_missed.goals[:, 1], 0)
     np.testing.assert_array_equal(all_missed.goals[:, 0], commands.goals[:, 0])
-    none = played(commands, with_effect("dropped_command", "flm", probability=0.0))
+    none = apply_to_commands(commands, with_effect("dropped_command", "flm", probability=0.0))
     np.testing.assert_array_equal(none.goals, commands.goals)
     many = np.arange(1.0, 2001.0)[:, None] * np.ones((1, 2))
     long = Commands(many[:, 0], commands.joints, many, many, np.ones((2000, 2), bool), 2001.0, np.zeros(2000, int))
-    some = played(long, with_effect("dropped_command", "flm", probability=0.3))
+    some = apply_to_commands(long, with_effect("dropped_command", "flm", probability=0.3))
     missed = some.goals[:, 1] != many[:, 1]
     assert missed.mean() == pytest.approx(0.3, abs=0.04)
     held = np.maximum.accumulate(np.where(missed, 0, many[:, 1]))
@@ -164,13 +164,13 @@ def test_a_dropped_command_keeps_the_pose_before(commands):
 def test_speed_order_gives_the_kth_bus_id_the_kth_names_speed():
     speeds = np.arange(1.0, 16.0)[None]
     sent = Commands(np.zeros(1), PUPPY.joints, speeds / 10, speeds, np.ones((1, 15), bool), 0.1, np.zeros(1, int))
-    got = played(sent, with_effect("speed_order"))
+    got = apply_to_commands(sent, with_effect("speed_order"))
     by_id = sorted(PUPPY.joints, key=lambda j: BUS_IDS[j])
     for k, joint in enumerate(by_id):
         assert got.speeds[0, got.column(joint)] == k + 1
     np.testing.assert_array_equal(got.goals, sent.goals)
     with pytest.raises(InputError, match="'blb' has no bus ID"):
-        played(sent, replace(PUPPY, bus_ids={}).with_effect(EffectSpec("speed_order")))
+        apply_to_commands(sent, replace(PUPPY, bus_ids={}).with_effect(EffectSpec("speed_order")))
 
 
 def test_a_take_keeps_what_was_sent(commands):
@@ -261,11 +261,11 @@ def test_a_tether_is_held_by_the_feet():
 def test_a_marker_frame_is_a_matter_of_the_measurement():
     m = Measurement(0.0)
     model = with_effect("marker_frame", "FLtop", rotation=(1.0, 0.0, -2.0))
-    turned = seen(m, model)
+    turned = apply_to_measurement(m, model)
     assert set(turned.frames) == {"FLtop"}
     np.testing.assert_allclose(turned.frames["FLtop"], np.deg2rad([1, 0, -2]))
     assert m.frames == {}
-    twice = seen(m, with_effect("marker_frame", "FLtop", rotation=(1.0, 0.0, 0.0)).with_effect(
+    twice = apply_to_measurement(m, with_effect("marker_frame", "FLtop", rotation=(1.0, 0.0, 0.0)).with_effect(
         EffectSpec("marker_frame", ("FLtop",), {"rotation": (2.0, 0.0, 0.0)})))
     np.testing.assert_allclose(twice.frames["FLtop"], np.deg2rad([3, 0, 0]), atol=1e-12)
 

@@ -14,7 +14,7 @@ from tests.servo_rig import GRAVITY, LENGTH, rig_model
 from tests.shared_data import practice
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_take
-from workbench.effects.apply import physics_of, seen
+from workbench.effects.apply import apply_to_measurement, physics_of
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
 from workbench.files import InputError
@@ -442,7 +442,7 @@ def test_a_turned_marker_frame_shows_at_rest_as_its_own_rotation_and_as_opposite
     take = Take("s", "simulation", np.arange(50) * 0.01 - 0.2, puppy.joints, still, starts_at=0.0)
     m = replace(m, yaw=0.0)
     clock = np.arange(30) / 120
-    zeroed, bodies = observe(take, seen(m, model), model, clock)
+    zeroed, bodies = observe(take, apply_to_measurement(m, model), model, clock)
     quat = Rotation.from_rotvec(rotation).as_quat(scalar_first=True)
     np.testing.assert_allclose(bodies["FLmid"].quat, np.tile(quat, (30, 1)), atol=1e-12)
     np.testing.assert_allclose(bodies["FLbtm"].quat, np.tile([1.0, 0, 0, 0], (30, 1)), atol=1e-12)
@@ -453,7 +453,7 @@ def test_a_turned_marker_frame_shows_at_rest_as_its_own_rotation_and_as_opposite
         np.testing.assert_allclose(zeroed.q[:, zeroed.column(joint)], expected, atol=1e-12)
     others = [c for c, j in enumerate(puppy.joints) if j not in ("flm", "flb")]
     np.testing.assert_allclose(zeroed.q[:, others], 0, atol=1e-12)
-    turned = observe(take, seen(replace(m, yaw=1.1), model), model, clock)[1]["FLmid"].quat
+    turned = observe(take, apply_to_measurement(replace(m, yaw=1.1), model), model, clock)[1]["FLmid"].quat
     np.testing.assert_allclose(turned, bodies["FLmid"].quat, atol=1e-12)
 
 
@@ -461,7 +461,7 @@ def test_a_turned_marker_frame_shows_at_rest_as_its_own_rotation_and_as_opposite
 def test_turned_marker_frames_are_read_as_from_a_recording(captured, asset):
     model, take, m = captured
     turned = model.with_effect(EffectSpec("marker_frame", (asset,), {"rotation": (2.0, -5.0, 4.0)}))
-    m, clock = seen(m, turned), np.arange(60) / 120
+    m, clock = apply_to_measurement(m, turned), np.arange(60) / 120
     zeroed, bodies = observe(take, m, turned, clock)
     again = take_from_recording(recorded(bodies, clock), m, turned, base="fixed")
     columns = [zeroed.column(j) for j in again.joints]
@@ -578,7 +578,7 @@ def test_a_urdf_takes_effects_as_an_sdf_does(tmp_path):
 
 @pytest.mark.parametrize(("name", "where", "parameters", "sentence"), [
     ("backlash", "flm", {"gap": 3.12}, "flm has 3.1 deg of free play between servo and link."),
-    ("joint_compliance", "flm", {"stiffness": 8.0}, "flm twists against its servo with 8.0 N m/rad."),
+    ("joint_compliance", "flm", {"stiffness": 8.0}, "flm is coupled to its servo with a stiffness of 8.0 N m/rad."),
     ("loose_mount", "flm", {"play": 2.0, "axis": (1.0, 0.0, 0.0)},
      "The link of flm is loose: it rocks by 2.0 deg about (1.00, 0.00, 0.00), across its servo's axis."),
     ("joint_stop", "flm", {"lower": -20.0, "upper": 30.0}, "flm goes no lower than -20.0 deg and no higher than 30.0 deg."),

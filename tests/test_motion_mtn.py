@@ -43,7 +43,7 @@ def test_page_becomes_a_motion(text: str, tmp_path: Path) -> None:
     assert len(file.pages) == 2
     page = file.page()
     assert (page.number, page.name, page.next, page.exit, page.repeat, page.inertial_force) == (1, "go", 0, 2, 1, 32)
-    assert page.compliance_slopes.tolist() == [32, 32, 128]
+    assert page.compliance.tolist() == [5, 5, 7]
     motion = file.motion("go", {"b": 1, "a": 2, "unmoved": 9})
     assert motion.joints == ("a", "b")
     assert motion.times == pytest.approx([0, 0.2, 0.3, 0.348])

@@ -14,7 +14,7 @@ from workbench.identify.results.findings import Rejected
 from workbench.identify.results.reasons import LessLikely, SpokenAgainst
 from workbench.robot import EffectSpec, puppy_model
 from workbench.view.report.page import Details, Table
-from workbench.view.report.tables import tried
+from workbench.view.report.tables import rejected_table
 
 
 def test_a_misspelled_robot_is_told_which_there_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -41,7 +41,7 @@ def test_add_servos_says_what_to_do_with_effects() -> None:
 def test_what_was_tried_is_sorted_by_how_much_less_likely() -> None:
     rejected = [Rejected("backlash", ("flm",), LessLikely(4.4)), Rejected("payload", ("body_link",), LessLikely(40.0)),
                 Rejected("dead_band", ("flm",), LessLikely(0.7))]
-    rows = [row for part in tried(rejected, "more") for t in (part.parts if isinstance(part, Details) else [part])
+    rows = [row for part in rejected_table(rejected, "more") for t in (part.parts if isinstance(part, Details) else [part])
             if isinstance(t, Table) for row in t.rows]
     assert ["2 times less" in str(row[-1]) for row in rows] == [True, False, False]
     assert "81 times less probable" in str(rows[1][-1])

@@ -238,7 +238,7 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
         "No known effect is a likely explanation of the model's error; the closest candidate is ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
     assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
-    assert "no effect that the workbench knows explains how" in headline(replace(nothing, verdict="unexplained"))
+    assert "no known effect explains the difference" in headline(replace(nothing, verdict="unexplained"))
 
 
 def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, tmp_path: Path) -> None:
@@ -259,7 +259,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
 def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeReport) -> None:
     quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
-    assert "Nowhere do the recordings differ from the nominal model by more than chance." in page
+    assert "The recordings do not differ from the nominal model by more than chance." in page
     assert "Afterwards all is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
@@ -267,8 +267,8 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeRep
 
 def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, take: TakeReport) -> None:
     whole, stopped = diagnosis(model), replace(diagnosis(model), stopped=True)
-    assert "limit of work" not in diagnosis_report(whole, [take], "Session small").html()
-    assert "limit of work" in diagnosis_report(stopped, [take], "Session small").html()
+    assert "work limit" not in diagnosis_report(whole, [take], "Session small").html()
+    assert "work limit" in diagnosis_report(stopped, [take], "Session small").html()
     assert "stopped" not in whole.to_json()
     assert stopped.to_json()["stopped"] is True
 
@@ -276,7 +276,7 @@ def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, take: TakeRe
 def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     told = replace(diagnosis(model).findings[0], where=("flm", "flb"))
     assert title_of(told.effect, told.where).endswith("at flm or flb")
-    assert sentence_of(told).endswith("Or the same at flb: these recordings do not say.")
+    assert sentence_of(told).endswith("Or the same at flb: these recordings cannot tell.")
     assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
 
 

@@ -48,7 +48,7 @@ def everything(model: RobotModel, simulated: Take, recorded: Take) -> dict[str, 
         "joint_errors": figures.joint_errors(channels),
         "joint_torques": figures.joint_torques(simulated.time, simulated.joints, {"torque": simulated.torque}, limit={"flm": 1}),
         "servo_margins": figures.servo_margins(model, simulated.joints, simulated.torque, simulated.v),
-        "base_wrench": figures.base_wrench(simulated.time, wrench, np.full_like(wrench, 0.1), stance=stance, weight=9.0),
+        "base_wrench": figures.base_wrench(simulated.time, wrench, np.full_like(wrench, 0.1), weight=9.0),
         "film_strip": figures.film_strip(model, simulated, recorded),
     }
 

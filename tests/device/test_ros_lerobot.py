@@ -12,8 +12,9 @@ from tests.command import succeeds
 from tests.device.motive import NAMES, scene
 from tests.device.servos import arm, robot
 from workbench.device.bus.survey import survey
-from workbench.device.capture import Recorder, VirtualLink, VirtualMotive, record_take
+from workbench.device.capture import Recorder, record_take
 from workbench.device.play import PlayOptions, perform
+from workbench.device.virtual.motive import VirtualLink, VirtualMotive
 from workbench.files import InputError
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording

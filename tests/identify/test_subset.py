@@ -15,7 +15,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
-from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
+from workbench.identify.subset import data_subset, floors_everywhere, rebalance, subset_used
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -133,7 +133,7 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     def judging(third):
         met = residuals[0].copy()
         met[:, k] = np.where(e.moving & (third == part), 40.0, 0.1)
-        (seen, _) = rebalanced(evaluator.evidence, {0: met, 1: residuals[1]})
+        (seen, _) = rebalance(evaluator.evidence, {0: met, 1: residuals[1]})
         assert (seen.uses["validate"] == e.uses["validate"]).all()
         assert not (seen.uses["fit"] & seen.uses["choose"]).any()
         assert ((seen.uses["fit"] | seen.uses["choose"]) == (e.uses["fit"] | e.uses["choose"])).all()
@@ -142,5 +142,5 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     assert judging(0) == {0}
     assert judging(2) == {2}
     assert judging(PROBLEM.deciding_part) == {PROBLEM.deciding_part}
-    assert rebalanced(evaluator.evidence, residuals) == list(evaluator.evidence)
-    assert rebalanced(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)
+    assert rebalance(evaluator.evidence, residuals) == list(evaluator.evidence)
+    assert rebalance(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)

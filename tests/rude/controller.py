@@ -68,11 +68,12 @@ def complaint(run: Run) -> str:
     return ""
 
 
-def injections(count: int, lengths: dict[int, int]) -> Iterator[Injection]:
-    """So many faults, spread evenly over all sessions, faults and transactions. lengths: transactions of each whole session."""
+def injections(count: int, lengths: dict[int, int], skip: int = 0, step: int = 1) -> Iterator[Injection]:
+    """So many faults, spread evenly over all sessions, faults and transactions; of these every `step`-th from `skip` on. lengths:
+    transactions of each whole session."""
     kinds = [(fault, mode) for fault in range(1, len(FAULTS)) for mode in range(3 if fault in WIRE else 1)]
     cells = [(session, *kind) for session in lengths for kind in kinds]
-    for n in range(count):
+    for n in range(skip, count, step):
         session, fault, mode = cells[n % len(cells)]
         turn, turns = n // len(cells), -(-count // len(cells))
         place = (turn * lengths[session] + n % len(cells) * 7) // turns % lengths[session]

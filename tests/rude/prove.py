@@ -25,8 +25,8 @@ ROOT = Path(__file__).resolve().parents[2]
 JUDGED = ("workbench/device", "workbench/robot", "workbench/motion", "firmware/core", "firmware/tests", "tests/rude",
           "tests/device")
 """Code that the outcome depends on."""
-PIECE = 500
-"""Faults in a piece: some seconds of processor."""
+PIECE = 1000
+"""Faults in a piece: 15 s of processor at most."""
 
 
 def play(faults: int, seed: int) -> tuple[int, list[str]]:

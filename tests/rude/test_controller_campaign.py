@@ -36,8 +36,7 @@ def whole_sessions() -> dict[int, int]:
 def campaign(count: int, skip: int = 0, step: int = 1) -> list[str]:
     """Every `step`-th of so many injections, from `skip` on; the monitor's complaints."""
     lengths = whole_sessions()
-    chosen = list(injections(count, lengths))[skip::step]
-    return [f"{i}: {c}" for i in chosen if (c := complaint(i.run(TABLES)))]
+    return [f"{i}: {c}" for i in injections(count, lengths, skip, step) if (c := complaint(i.run(TABLES)))]
 
 
 def test_nine_hundred_faults_break_nothing() -> None:

@@ -17,10 +17,14 @@ FOUND = [
     ("XL-330", "garbled command", 5, 198),
     ("AX-12A", "garbled command", 11, 791),
     ("AX-12A", "stall", 252, 940),
+    ("AX-12A", "twin", 248, 726),
+    ("STS3215", "twin", 358, 16),
+    ("STS3215", "twin", 371, 17),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
 lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
-program's questions in the log; torque that stayed on where a start failed."""
+program's questions in the log; torque that stayed on where a start failed; two servos of one ID that were taken for one as
+long as an answer could be read now and then, and whose positions were mixed in the log."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

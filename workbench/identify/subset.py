@@ -12,7 +12,7 @@ from workbench.identify.problem import TakeEvidence, channel_gaps, part_of
 from workbench.types import Array
 
 
-def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+def rebalance(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
     """Takes of which, on a fixed base, another third of the frames judges where that which does shows next to nothing of what
     a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
     return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e

@@ -42,6 +42,8 @@ class _Content:
     sent: list[tuple[float, dict[str, Sequence[float]]]] = field(default_factory=list)
     read: dict[str, list[Sequence[float]]] = field(default_factory=dict)
     torque: list[tuple[float, dict[str, bool]]] = field(default_factory=list)
+    doubted: dict[str, float] = field(default_factory=dict)
+    """From when on a joint's readings may be another servo's."""
     rests: list[float] = field(default_factory=list)
     """When it had come to rest in neutral."""
 
@@ -51,7 +53,8 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     neutral.
 
     A row at each pose, and one for readings within 4 ms; goals and moving speeds as they were sent; positions where the
-    servo was read then, else blank. InputError where nothing was read.
+    servo was read then, else blank, and of a servo that did not answer as one does from shortly before it ended the motion.
+    InputError where nothing was read.
     """
     content = _read(journal)
     if not content.sent or not all(len(content.read.get(j, ())) > 1 for j in content.joints):
@@ -59,6 +62,7 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     start = _rest_begins(content)
     readings = _trusted({j: np.array(content.read[j], dtype=float) for j in content.joints})
     end = max(rows[-1, 0] for rows in readings.values())
+    readings = {j: rows[rows[:, 0] < content.doubted.get(j, math.inf)] for j, rows in readings.items()}
     poses = np.array([t for t, _ in content.sent if t >= start])
     moved = poses[0] if len(poses) else end
     time = _rows(start, poses, np.concatenate([r[:, 0] for r in readings.values()]))
@@ -110,11 +114,16 @@ def _trusted(readings: Mapping[str, Array]) -> dict[str, Array]:
     return out
 
 
+def possible(step: float, seconds: float) -> bool:
+    """Whether a joint can have turned by this step [rad] in this time."""
+    return abs(step) <= max(FASTEST * seconds, JUMP)
+
+
 def _possible(rows: Array) -> Mask:
     """Without single readings to and from which the joint would have had to turn faster than any servo: answers to another
     program's question, or bytes whose errors the checksum missed."""
     step, took = np.diff(rows[:, 1]), np.maximum(np.diff(rows[:, 0]), 1e-4)
-    fast = (np.abs(step) > FASTEST * took) & (np.abs(step) > JUMP)
+    fast = np.abs(step) > np.maximum(FASTEST * took, JUMP)
     out = np.ones(len(rows), dtype=bool)
     out[1:-1] = ~(fast[:-1] & fast[1:] & (step[:-1] * step[1:] < 0))
     return out
@@ -122,6 +131,8 @@ def _possible(rows: Array) -> Mask:
 
 def _position(time: Array, known: Array, values: Array, moved: float) -> Array:
     """Readings near each row; before the first pose, and where two readings agree, all rows between them as well."""
+    if len(known) < 2:
+        return np.full(len(time), np.nan)
     after = np.clip(np.searchsorted(known, time, side="left"), 1, len(known) - 1)
     gap = known[after] - known[after - 1]
     nearest = np.minimum(np.abs(known[after] - time), np.abs(known[after - 1] - time))
@@ -155,6 +166,8 @@ def _take(content: _Content, entry: Mapping[str, Any]) -> None:
         content.read.setdefault(entry["joint"], []).append(row)
     elif "torque" in entry:
         content.torque.append((entry["t"], entry["torque"]))
+    elif "doubted" in entry:
+        content.doubted |= dict.fromkeys(entry["doubted"], entry["since"])
     elif "rest" in entry:
         content.rests.append(entry["t"])
 

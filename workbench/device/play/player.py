@@ -230,6 +230,7 @@ class _Performance:
         if math.isnan(self.ended):
             self.ended, self.read = rig.bus.now(), rig.readings - self.read_before
         rig.journal.write(t=rig.bus.now(), stopped=reaction.reason)
+        rig.doubt()
         if reaction.how == "release" or not self._energised:
             return reaction.reason
         rig.watch.only_release()

@@ -11,6 +11,7 @@ from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.group import answer_length
 from workbench.device.play.journal import PlayJournal
+from workbench.device.play.log import possible
 from workbench.device.play.watch import Watch
 from workbench.motion.lead_in import SLOW
 from workbench.robot.mounting import JointServo
@@ -34,6 +35,8 @@ DEAREST = 0.04
 """Largest estimated cost of a reading [s]: a longer one was no reading, but a computer that stalled."""
 RELEASE = 1.0
 """How long torque off is said again to servos that do not confirm it [s]."""
+DOUBTED = 0.1
+"""How much longer than it may stay silent a doubted servo's readings are left out of the log [s]: the time a reaction takes."""
 LIMP_EVERY = 5
 """Torque enable, and the marker that a restart clears, are read with every fifth reading of a servo: their addresses are far
 off."""
@@ -70,6 +73,7 @@ class Rig:
         self._asked_since = self._heard_since = False
         self.readings: Counter[str] = Counter()
         self.angles: dict[str, float] = {}
+        self._read_at: dict[str, float] = {}
 
     def measure(self) -> dict[str, float]:
         """Where each joint is [rad]: read twice, again where the two differ by more than a count can flicker."""
@@ -205,9 +209,16 @@ class Rig:
         for k, joint in enumerate(asked):
             values = got.get(self.ids[joint])
             if values is None:
-                self._suspects += [joint] * (joint not in self._suspects and not self._suspects)
+                if not self._suspects:  # those after it may only have waited for its answer
+                    self._suspects.append(joint)
+                    self.watch.silent(self.ids[joint], bus.now())
                 continue
             self._take(joint, values, begun + k * each, bus.now() - begun)
+
+    def doubt(self) -> None:
+        """Where the watch doubts a servo, the journal says from when on its readings may be another servo's."""
+        since = self.bus.now() - self.watch.options.silent - DOUBTED
+        self.journal.write(t=self.bus.now(), since=since, doubted=[j for j, i in self.ids.items() if i == self.watch.doubted])
 
     def _answer_seconds(self, names: tuple[str, ...]) -> float:
         """How long one of many answers takes [s]."""
@@ -238,7 +249,10 @@ class Rig:
         if "present_position" not in values:
             return
         angle = self.servos[joint].angle(values["present_position"])
-        self.angles[joint] = angle
+        if joint in self._read_at and not possible(angle - self.angles[joint], time - self._read_at[joint]):
+            self.watch.impossible(servo, bus.now())
+            return
+        self.angles[joint], self._read_at[joint] = angle, time
         if GOAL in values and joint in self._told:
             if values[GOAL] == self._told[joint][0]:
                 self._open.discard(joint)

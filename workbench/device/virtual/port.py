@@ -101,7 +101,8 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         if not self._rx:
             clock = self.bus.clock
             clock.advance(min(max(clock.next_time, clock.now + 1), clock.now + MILLISECOND))
-        return bytes(self._rx.popleft() for _ in range(min(length, len(self._rx))))
+        rx = self._rx
+        return bytes([rx.popleft() for _ in range(min(length, len(rx)))]) if rx else b""
 
     def getBytesAvailable(self) -> int:
         """How many bytes wait."""

@@ -78,10 +78,19 @@ def crc16(data: bytes) -> int:
     """CRC-16/UMTS: polynomial 0x8005, from 0."""
     crc = 0
     for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
+        crc = (crc << 8 ^ _CRC[crc >> 8 ^ byte]) & 0xFFFF
     return crc
+
+
+def _shifted(byte: int) -> int:
+    """A byte's share of the CRC, bit by bit."""
+    crc = byte << 8
+    for _ in range(8):
+        crc = (crc << 1 ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+_CRC = tuple(map(_shifted, range(256)))
 
 
 def _narrow(instruction: int, parameters: bytes) -> bytes:

@@ -80,6 +80,11 @@ class VirtualProfile:
         return {r.name: r for r in self.registers}
 
     @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each register lies in the table."""
+        return {r.name: slice(r.address, r.address + r.size) for r in self.registers}
+
+    @cached_property
     def at(self) -> dict[int, tuple[Register, int]]:
         """Which register, and which byte of it, lies at an address."""
         return {r.address + k: (r, k) for r in self.registers for k in range(r.size)}

@@ -68,8 +68,7 @@ class VirtualServo:
     # Registers
 
     def __getitem__(self, name: str) -> int:
-        register = self.profile.by_name[name]
-        return int.from_bytes(self._table[register.address:register.address + register.size], "little")
+        return int.from_bytes(self._table[self.profile.slices[name]], "little")
 
     def __setitem__(self, name: str, value: int) -> None:
         """Sets a register as if from inside, without checks and times."""

@@ -22,7 +22,7 @@ from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, continue_search, lockstep, with_best, with_fits, without_names
-from workbench.identify.evidence.tied_names import names_of_tie
+from workbench.identify.evidence.tied_names import TieFits, fits_of_tie
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import carried_on, on_windows, slopes_by_law, with_unknown_law
 from workbench.identify.parameters import Candidate
@@ -62,11 +62,11 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = continue_search(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
-    names: dict[int, list[Fitted]] = {}
+    ties: dict[int, TieFits | None] = {}
     if options.most:
         progress("names that are tied", None)
-        names = lockstep(with_best(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
-        found = tuple(with_fits(f, names[k], options) for k, f in enumerate(found))
+        ties = lockstep(with_best(rollouts, found), {k: fits_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+        found = tuple(f if (tie := ties[k]) is None else with_fits(f, tie.names, options) for k, f in enumerate(found))
         progress("an unnamed torque", None)
         rollouts, found = _beside_unnamed(with_best(rollouts, found), found, options)
     progress("numbers at a finer step", None)
@@ -84,7 +84,7 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
     return Explanation(nominal, replace(with_best(rollouts, found), shared=together.shared), found, believed, robot,
                        tuple(rejected), options, problem.played.missed, drifting, stopped,
-                       tuple(names.get(k, []) for k in range(len(found))))
+                       tuple(ties.get(k) for k in range(len(found))))
 
 
 def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,

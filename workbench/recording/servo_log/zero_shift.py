@@ -69,7 +69,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
             return none, []
         if abs(middle[i + 1] - middle[i] - jump) > c.agreement * abs(jump):
             return none, []
-    true = _true_level(level, edges, middle, fit.offset, c)
+    true = _true_level(level, middle, fit.offset, c)
     off = np.repeat(level - level[true], np.diff(edges))
     return off, [_line(log, off, edges)]
 
@@ -97,7 +97,7 @@ def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     return bool(len(bend) and np.max(bend * np.sign(step)) > c.goal * abs(step))
 
 
-def _true_level(level: Array, edges: list[int], middle: list[float], offset: float, c: ShiftChecks) -> int:
+def _true_level(level: Array, middle: list[float], offset: float, c: ShiftChecks) -> int:
     """The stretch whose zero is right: that nearest to the goals, or the first where there is little between them."""
     distance = np.abs(np.array(middle) + offset)
     best = int(np.argmin(distance))

@@ -92,7 +92,8 @@ def _provenance(comparison: Comparison, model: RobotModel) -> Provenance:
 def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Section:
     """All there is to see of one take; its 3D replay is written to `replay` and shown."""
     write_replay(replay, model, take.simulated, take.recorded, title=take.name)
-    parts: list[Part] = [Picture(joint_errors(take.joints), "Error of each joint over what noise and numerics alone would make.")]
+    parts: list[Part] = [Picture(joint_errors(take.joints),
+                                 "Error of each joint, with the error that noise and numerics alone would cause.")]
     problems = take.recorded.problems
     if problems:
         parts.append(Details(f"{_count(len(problems), 'remark')} on the recording", [Text("\n\n".join(problems))]))
