@@ -9,7 +9,7 @@ from html import escape
 
 import numpy as np
 
-from workbench.compare.comparison import aligned
+from workbench.compare.comparison import align
 from workbench.recording.take import Take
 from workbench.types import Array
 from workbench.view.playback import since_start
@@ -32,7 +32,7 @@ class Curves:
 def curves_html(curves: Curves) -> str:
     """The figure; the page must hold assets/curves.js."""
     recorded = curves.recorded
-    simulated = aligned(curves.simulated, recorded)
+    simulated = align(curves.simulated, recorded)
     time = since_start(recorded)
     rows = slice(None, None, -(-len(time) // _ROWS))
     content: dict[str, object] = {"time": [round(float(t), 4) for t in time[rows]]}
