@@ -66,9 +66,10 @@ mutants: $(STAMP)
 	$(BIN)/mutmut run --max-children $(WORKERS)
 	$(BIN)/mutmut results
 
-# Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`.
+# Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`;
+# learned_gait needs the extra [learn].
 STUDIES := $(filter-out concealed_effects replay,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
-           $(filter-out gait_recertify gait_row_seeds,$(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py)))
+           $(filter-out gait_recertify gait_row_seeds learned_gait,$(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py)))
 
 studies: $(STAMP)
 	@set -e; for study in $(STUDIES); do echo "== $$study"; $(BIN)/python -m studies.$$study; done

@@ -37,7 +37,7 @@ from workbench.view.figures.style import new_figure, styled
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table
 
 GAIT = ROOT / "data/gaits/demo/gait.csv"
-ACTIONS, QUICK_ACTIONS = 120_000, 512
+ACTIONS, QUICK_ACTIONS = 24_000, 512
 DRAWN, SIDE_BY_SIDE, SEED = 6, 8, 58
 ROLLOUT = 128
 """Actions of each robot between two updates of the policy, somewhat more than an episode: the gait has twelve poses."""
@@ -124,7 +124,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     options = replace(OPTIONS, cycles=6) if quick else OPTIONS
     draws = CertifyOptions(draws=2 if quick else 24, checked=0, trimmed=0, watched=0, seconds=1.0 if quick else 2.0, variants=(),
                            n_jobs=1)  # enough to compare speeds and falls
-    whole = draws if quick else CertifyOptions(draws=24, trimmed=0, n_jobs=1)
+    whole = draws if quick else CertifyOptions(draws=24, checked=2, trimmed=0, n_jobs=1)
     began = time.process_time()
     with TemporaryDirectory(prefix="workbench-") as folder:
         robots = [model, *load_ensemble().draws(model, 1 if quick else DRAWN, SEED, Path(folder))]

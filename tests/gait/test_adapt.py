@@ -45,6 +45,13 @@ def test_a_trial_changes_what_is_expected_nearby_and_not_far_away() -> None:
     assert sd[0] < 0.2 * sd[-1]
 
 
+def test_a_model_that_cannot_walk_at_all_leaves_the_choice_to_the_trials() -> None:
+    chooser = TrialChooser(NUMBERS, np.zeros(len(NUMBERS)))
+    for speed in (0.01, 0.03, 0.02):
+        chooser.tell(chooser.next(), speed)
+    assert chooser.tried[chooser.best] == 0.03
+
+
 def test_nothing_to_try_and_nothing_tried_are_said() -> None:
     with pytest.raises(InputError, match="none to try"):
         TrialChooser(NUMBERS, np.full(len(NUMBERS), np.nan))

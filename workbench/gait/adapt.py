@@ -10,6 +10,9 @@ from workbench.files import InputError
 from workbench.files.option_checks import check_positive
 from workbench.types import Array
 
+LEAST = 1e-6
+"""Scale of predictions that are all zero, so that trials still correct them."""
+
 
 @dataclass(frozen=True)
 class TrialOptions:
@@ -43,7 +46,7 @@ class TrialChooser:
             raise InputError(None, "the model falls with every gait; there is none to try")
         extent = np.ptp(numbers, axis=0)
         self._x = np.asarray(numbers, dtype=float) / np.where(extent > 0, extent, 1.0)
-        self._scale = float(np.nanmax(np.abs(self.predicted)))
+        self._scale = max(float(np.nanmax(np.abs(self.predicted))), LEAST)
         self.tried: dict[int, float] = {}
 
     @property

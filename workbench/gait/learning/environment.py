@@ -74,7 +74,7 @@ class GaitVectorEnv(VectorEnv):
     """Many robots at once, each as in `GaitEnv`; the simulations run in threads. A robot whose episode has ended begins a new one
     with the next step, whose action is not played (`AutoresetMode.NEXT_STEP`)."""
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(self, num_envs: int, family: GaitFamily, robots: Sequence[RobotModel], actions: Kind = "cycle",
                  options: LearningOptions | None = None, threads: int = 2) -> None:

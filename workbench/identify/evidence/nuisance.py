@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,6 +30,9 @@ UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_frictio
          "command_filter": "s", "derivative_gain": "s/rad", "load_friction": "1", ZERO: "rad"}
 """The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
 apart."""
+
+KEPT = 256
+"""Recalibrated servos that are kept: most models that are compared differ in one number of one servo."""
 
 
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
@@ -67,7 +71,7 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
             zeros += [turned_horn(joint, by)] if by else []
         elif by:
             scales.setdefault(joint, {})[name] = math.exp(by)
-    servos |= {joint: _scaled(servos[joint], by) for joint, by in scales.items()}
+    servos |= {joint: _scaled(servos[joint], tuple(by.items())) for joint, by in scales.items()}
     return model.with_physics(servos, (*model.effects, *zeros))
 
 
@@ -102,9 +106,10 @@ def nominal_value(servo: ServoConstants, name: str) -> float:
     return float(getattr(servo, name))
 
 
-def _scaled(servo: ServoConstants, scales: Mapping[str, float]) -> ServoConstants:
+@lru_cache(maxsize=KEPT)
+def _scaled(servo: ServoConstants, scales: tuple[tuple[str, float], ...]) -> ServoConstants:
     out = {"stall_torque": servo.stall_torque, "no_load_speed": servo.no_load_speed}
-    for name, by in scales.items():
+    for name, by in scales:
         if name == "torque_at_full_duty":  # the back-EMF stays
             out = {**out, "stall_torque": out["stall_torque"] * by, "no_load_speed": out["no_load_speed"] * by}
         elif name == "back_emf":
