@@ -24,7 +24,7 @@ def torque_logs(files: Sequence[str | None]) -> bool:
     return bool(found)
 
 
-def report_torque_logs(verb: str, files: Sequence[str], model: RobotModel, out: str) -> int:
+def report_torque_logs(verb: str, files: Sequence[str], model: RobotModel, out: Path) -> int:
     """Writes the torque gap of one or two logs, and report.html, into the folder `out`; prints the tables."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress

@@ -31,9 +31,6 @@ UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_frictio
 """The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
 apart."""
 
-KEPT = 256
-"""Recalibrated servos that are kept: most models that are compared differ in one number of one servo."""
-
 
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
     """The same of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they drift.
@@ -106,7 +103,7 @@ def nominal_value(servo: ServoConstants, name: str) -> float:
     return float(getattr(servo, name))
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=256)  # most models that are compared differ in one number of one servo
 def _scaled(servo: ServoConstants, scales: tuple[tuple[str, float], ...]) -> ServoConstants:
     out = {"stall_torque": servo.stall_torque, "no_load_speed": servo.no_load_speed}
     for name, by in scales:
