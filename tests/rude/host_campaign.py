@@ -59,7 +59,7 @@ def _model() -> RobotModel:
 
 
 def _allowed(family: str, commands: Commands) -> Allowed:
-    """What the player may do with this motion, with 5 % for rounding."""
+    """Limits that the player keeps in this motion, 5 % wider, as registers are rounded."""
     profile, options = servo_profile(family), PlayOptions()
     ramp = math.ceil(1.05 * 2 * options.ramp_speed / profile.speed_unit)
     fastest = math.ceil(1.05 * float(commands.speeds.max()) / profile.speed_unit)

@@ -26,6 +26,7 @@ FOUND = [
     ("AX-12A", "brown-out", 300, 3),
     ("XL-330", "garbled command", 7, 3),
     ("XL-330", "garbled command", 11, 760),
+    ("STS3215", "restart", 615, 6),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
 lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
@@ -70,8 +71,9 @@ def test_the_monitor_sees_what_it_is_there_for():
     assert broken([sample(0.0), sample(0.1)]) == []
     assert "torque 50 ms after a release" in broken([sample(0.0), sample(0.1), sample(0.2)], releases=[0.05])[0]
     assert "without or beyond its speed" in broken([sample(0.0), sample(0.1, speed=0)])[0]
-    walk = [sample(0.01 * k, goal=512 + 20 * (k % 3), answers=k < 20) for k in range(80)]
-    away = [Sample(s.time, {1: replace(s.held[1], goal=round(s.goal[1]), speed=90)}, s.goal, s.angle) for s in walk]
+    walk = [sample(0.01 * k, answers=k < 20) for k in range(80)]
+    away = [Sample(s.time, {1: replace(s.held[1], goal=512 + 20 * (k % 3), speed=90 if s.time else 40)}, s.goal, s.angle)
+            for k, s in enumerate(walk)]
     assert "fault was not found in 0.4 s" in broken(away)[0]
     assert "motion 50 ms after a stop" in broken(away[:20], stops=[0.05])[0]
     limp = [sample(0.1, torque=False), sample(0.2, torque=False, angle=0.1)]
