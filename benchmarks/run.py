@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from benchmarks import compiled, drives, engine, reader
+from benchmarks.captured import captured_against_observed
 from benchmarks.diagnose_time import diagnose_time
 from benchmarks.figure import Figure
 from benchmarks.servo_logs import servo_log_rollouts_against_mujoco
@@ -48,6 +49,8 @@ LOG, LOG_QUICK, LOG_DIAGNOSED = 4.0, 0.3, 2.4
 """Duration of the log that is fitted, also in the quick form, and of the one that is diagnosed [s]."""
 TURNS = 2
 MODELS, LOG_TURNS = 50, 5
+CAPTURED, CAPTURED_QUICK = (5.0, 7), (0.6, 1)
+"""Length of the take [s] and turns of rollouts of captured takes, also in the quick form."""
 
 
 def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
@@ -91,8 +94,10 @@ def _fits(quick: bool, progress: Callable[[str], None]) -> list[Figure]:
     progress("rollouts of a servo log against MuJoCo's")
     logs = (servo_log_rollouts_against_mujoco(LOG_QUICK, 2, 1, SEED) if quick
             else servo_log_rollouts_against_mujoco(LOG, MODELS, LOG_TURNS, SEED))
+    progress("rollouts of captured takes")
+    captured = captured_against_observed(*(CAPTURED_QUICK if quick else CAPTURED))
     progress("where a diagnosis spends its time")
-    return [fit, logs, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
+    return [fit, logs, *captured, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
 
 
 def _machine(load: float) -> dict[str, Any]:

@@ -11,6 +11,7 @@ the limit on the turn binds. Errors count from 0.8 m on; headings are means over
 
 from __future__ import annotations
 
+import json
 import math
 import tempfile
 import time
@@ -21,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from studies.common import ROOT, Array, publish, run_study, sign
+from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.drive.controller import CycleController
 from workbench.gait.drive.family import GaitFamily, load_family
@@ -41,7 +43,7 @@ TURNS = (15.0, 100.0)
 LINE = ((2.0, 0.0),)
 WAY_POINTS = ((0.6, 0.15), (1.2, -0.15), (1.7, 0.1), (1.9, 0.6), (1.6, 1.0))
 BENDS = ((0.5, 0.0), (0.95, 0.2), (1.4, 0.0), (1.85, 0.2), (2.3, 0.0))
-"""Swings whose smallest radius, 0.2 m, is that of the nominal robot at the largest turn."""
+"""Swings whose smallest radius, 0.22 m, is just above that of the nominal robot at the largest turn, 0.2 m."""
 PATHS = {"line": LINE, "way-points": WAY_POINTS, "bends": BENDS}
 LAWS = ("mpc", "proportional")
 WITHIN_LINE = (3.0, 3.0)
@@ -97,28 +99,40 @@ def planning_time(step_map: StepMap, options: DriveOptions, plans: int = 200) ->
     return float(np.median(taken))
 
 
+def one(family: GaitFamily, step_map: StepMap, robot: RobotModel, k: int) -> dict[str, Any] | None:
+    """The k-th drawn robot along each path by each law; None where `open_loop` is None."""
+    turned = open_loop(family, step_map, robot, k)
+    if turned is None:
+        return None
+    row: dict[str, Any] = {"drawn": k + 1, "open loop deg": turned}
+    for name, points in PATHS.items():
+        for law in LAWS:
+            path = WayPath(points)
+            controller = CycleController(path, step_map, family.period, DriveOptions(law=law))  # type: ignore[arg-type]
+            walk = SimulatedWalk(family, robot, Cameras(lost=LOST), SEED + k)
+            row[f"{name}, {law}"] = numbers_of(drive(walk, path, controller, 150), family.period)
+    return row
+
+
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
-    """Draws the robots, steers each along each path by both laws, and counts; the page is written after each robot."""
+    """Draws the robots, steers each along each path by both laws, and counts. The page is written after each robot; a study that
+    was stopped resumes."""
     model = puppy_model()
     family = load_family(GAIT, model)
     step_map = fit_step_map(family, model, SEED, MapOptions(cycles=12, rollouts=2) if quick else MapOptions())
     count = 1 if quick else ROBOTS
     milliseconds = 1000 * planning_time(step_map, DriveOptions(), 20 if quick else 200)
     runs, said = list[dict[str, Any]](), ""
+    (out / "results").mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         for k, robot in enumerate(load_ensemble().draws(model, 5 * count, SEED, Path(folder))):
-            progress(f"drawn robot {k + 1}, open loop", len(runs) / count)
-            turned = open_loop(family, step_map, robot, k)
-            if turned is None:
+            done = out / "results" / f"drawn{k + 1:03d}.json"
+            if not done.is_file():
+                progress(f"robot {len(runs) + 1} of {count}, drawn {k + 1}", len(runs) / count)
+                write_whole(done, json.dumps(one(family, step_map, robot, k)) + "\n")
+            row = json.loads(read_text(done))
+            if row is None:
                 continue
-            row: dict[str, Any] = {"drawn": k + 1, "open loop deg": turned}
-            for name, points in PATHS.items():
-                for law in LAWS:
-                    progress(f"robot {len(runs) + 1} of {count}, {name}, {law}", len(runs) / count)
-                    path = WayPath(points)
-                    controller = CycleController(path, step_map, family.period, DriveOptions(law=law))  # type: ignore[arg-type]
-                    walk = SimulatedWalk(family, robot, Cameras(lost=LOST), SEED + k)
-                    row[f"{name}, {law}"] = numbers_of(drive(walk, path, controller, 150), family.period)
             runs.append(row)
             said = publish(out, model, _report(model, runs, milliseconds, step_map),
                            {"robots": runs, "ms a plan": milliseconds, "step map": dict(vars(step_map))}, {})

@@ -31,7 +31,7 @@ from workbench.identify.evidence.region import region_of
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.parameters import Candidate
-from workbench.identify.preparation import prepared
+from workbench.identify.preparation import prepare
 from workbench.identify.rollouts import RolloutEvaluator
 from workbench.simulation import SimulationConfig
 from workbench.types import Array
@@ -49,7 +49,7 @@ def evidence(out: Path, quick: bool, progress: Callable[[str, float | None], Non
     session = load_session(write_session(out, logs, published(DATA, "m1")))
     takes, _ = read_takes(session)
     config = SimulationConfig(settle=0.1, contact_period=0, time_step=4e-3)
-    evaluator = RolloutEvaluator(prepared(session, takes, config, 1, progress).evidence, config, 1)
+    evaluator = RolloutEvaluator(prepare(session, takes, config, 1, progress).evidence, config, 1)
     joint = session.model.joints[0]
     numbers = [n for n in uncertain_numbers(session.model, joint, zeroed=False) if n.name in NUMBERS]
     region = region_of([joint], evaluator.evidence, numbers, (), OPTIONS)

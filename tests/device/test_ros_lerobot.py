@@ -104,6 +104,13 @@ def test_a_played_motion_becomes_joint_states_and_a_trajectory(tmp_path):
     (tmp_path / "other").mkdir()
     with pytest.raises(InputError, match="already exists and is not a bag"):
         write_rosbag(written, tmp_path / "other", BEGAN)
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="holds more than one"):
+        write_rosbag(written, folder, BEGAN)
+    assert (folder / "notes.txt").read_text() == "mine"
+    (tmp_path / "other" / "metadata.yaml").write_text("title: photographs\n")
+    with pytest.raises(InputError, match="is not a bag"):
+        write_rosbag(written, tmp_path / "other", BEGAN)
 
 
 def test_a_take_becomes_transforms(tmp_path):

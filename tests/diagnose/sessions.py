@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.gap_sessions import session_content, write_session
 from workbench.compare.session import Session, load_session
-from workbench.effects.apply import seen
+from workbench.effects.apply import apply_to_measurement
 from workbench.motion import save_motion
 from workbench.motion.motion import Motion
 from workbench.recording import BodyTrack, Measurement, observe, write_motive
@@ -59,7 +59,7 @@ def record(path: Path, session: Session, take: int, hidden: Sequence[EffectSpec]
     assert commands is not None
     seen_take = Simulation(model, SimulationConfig(base=spec.base)).run(commands, commands.end + 0.6, 0.3)
     rng = np.random.default_rng(seed)
-    measurement = seen(Measurement(
+    measurement = apply_to_measurement(Measurement(
         starts_at=STARTS_AT, yaw=0.3, origin=np.array([0.5, -0.2, 0.1]),
         pivots={a: rng.normal(0, 0.01, 3) + np.array([0, 0, 0.04]) for a in model.rigid_bodies}), model)
     time = np.arange(0, STARTS_AT + commands.end + 0.5, 1 / RATE)

@@ -13,7 +13,7 @@ from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep
-from workbench.identify.evidence.tied_names import gravity_over_torque, names_of_tie, ratio_of, shared_by_tie
+from workbench.identify.evidence.tied_names import TieFits, fits_of_tie, gravity_over_torque, ratio_of, shared_by_tie
 from workbench.identify.results.findings import Alternative, Change, Estimate, Finding
 from workbench.identify.results.tied_names import GravityOverTorque, TiedName
 
@@ -31,19 +31,24 @@ class Scaled(Linear):
         return super().left(scaled)
 
 
-def found(log_ratio, sd, options=OPTIONS):
-    """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie."""
+def found(log_ratio, sd, options=OPTIONS, loaded=1.0):
+    """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie.
+    loaded: by how much the effects do less in the second half, where a known weight hangs and torques hold more."""
     names = [candidate(name) for name in ("ground_tilt", "parallel_spring", "backlash")]
     here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(3)
     torque, play = rng.normal(size=(2, 1600)) * 0.1
     does = {"torque_at_full_duty": torque, "backlash.gap": play}
-    does |= {f"{c.name}.{c.parameters[0].name}": -SHIFT * torque for c in names[:2]}
+    gravity = np.where(np.arange(1600) < 800, 1.0, loaded) * torque
+    does |= {f"{c.name}.{c.parameters[0].name}": -SHIFT * gravity for c in names[:2]}
     truth = -log_ratio * torque + 1e-3 * rng.normal(size=1600)
     rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=truth, does=does)
     fit = lockstep(rig, {0: fitting(here, options, start(here.numbers), 0.1, 2 * options.iterations)})[0]
-    fits = lockstep(rig, {0: names_of_tie(here, options, fit)})[0]
-    return here, fit, [lockstep(rig, {0: regressed(here, options, g)})[0] for g in fits]
+    fits = lockstep(rig, {0: fits_of_tie(here, options, fit)})[0]
+    if fits is not None:
+        again = [lockstep(rig, {0: regressed(here, options, g)})[0] for g in (fits.torque, *fits.names)]
+        fits = TieFits(again[0], tuple(again[1:]))
+    return here, fit, fits
 
 
 def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_names():
@@ -53,7 +58,7 @@ def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_na
     tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
     assert tied.confidence == 0.0
     assert "ground_tilt" in {n.effect for n in tied.names}
-    sizes = {g.hypothesis.effects[0].name: g.hypothesis.sizes()[0][1][0] for g in fits}
+    sizes = {g.hypothesis.effects[0].name: g.hypothesis.sizes()[0][1][0] for g in fits.names}
     assert sizes["ground_tilt"] == pytest.approx(math.log(0.6) / SHIFT, rel=0.3)
     said = json.dumps(tied.to_json())
     assert "times that of the files" in said
@@ -62,19 +67,29 @@ def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_na
 
 
 def test_variation_between_days_is_not_reported():
-    assert found(0.05, 0.5)[2] == []
+    assert found(0.05, 0.5)[2] is None
+
+
+def test_a_known_weight_in_some_takes_leaves_torque_as_the_only_cause():
+    here, fit, fits = found(math.log(0.6), 0.5, loaded=0.5)
+    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
+    assert tied.torque_behind == 0.0
+    assert min(n.behind for n in tied.names) > OPTIONS.occam
+    assert tied.competitive == ()
+    assert "leave one: all torques of the servo times 1.66" in tied.in_words()
+    assert "`load:`" not in tied.in_words()
 
 
 def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
     since = EvidenceOptions(drift=SinceThen())
     here, fit, fits = found(math.log(1.3), 0.06, since)
-    best = max(fits, key=lambda g: g.log_posterior)
-    said = gravity_over_torque(here, since, posterior_of([fit, *fits], since), fits)
+    best = max(fits.names, key=lambda g: g.log_posterior)
+    said = gravity_over_torque(here, since, posterior_of([fit, *fits.names], since), fits)
     assert said.ratio.value == pytest.approx(1.3, rel=0.02)
     assert said.ratio.low < 1.3 < said.ratio.high
     assert said.confidence > 0.8
     assert best.log_posterior > fit.log_posterior
-    assert "--model" not in said.said()
+    assert "--model" not in said.in_words()
 
 
 def test_names_that_fits_do_not_separate_share_the_ties_probability():
@@ -87,20 +102,22 @@ def test_names_that_fits_do_not_separate_share_the_ties_probability():
 
     ratio = Estimate(1.3, 1.2, 1.4, "1")
     names = (named("parallel_spring", 0.0), named("payload", 3.0), named("com_shift", 9.0))
-    told = GravityOverTorque((JOINT,), ratio, 0.96, names, True)
-    shared = shared_by_tie(finding("parallel_spring"), told, OPTIONS)
+    told = GravityOverTorque((JOINT,), ratio, 0.96, names, True, OPTIONS.occam)
+    shared = shared_by_tie(finding("parallel_spring"), told)
     assert shared.confidence == pytest.approx(0.48)
-    assert shared.tie == Alternative("payload", (JOINT,), 0.48)
-    assert shared.together == pytest.approx(0.96)
+    assert shared.alternatives == (Alternative("payload", (JOINT,), 0.48),)
+    assert shared.to_json()["confidence"] == pytest.approx(0.48)
+    assert shared.of_tie == pytest.approx(0.96)
+    assert shared.likely
     for alone in (finding("backlash"), finding("com_shift")):
-        assert shared_by_tie(alone, told, OPTIONS) == alone
-    assert shared_by_tie(finding("payload"), None, OPTIONS) == finding("payload")
+        assert shared_by_tie(alone, told) == alone
+    assert shared_by_tie(finding("payload"), None) == finding("payload")
 
 
 def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
     names = (TiedName("payload", ("arm",), {}, "arm carries 200 g more.", 0.0),
              TiedName("parallel_spring", (JOINT,), {}, "A spring pulls.", 40.0))
-    tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False)
-    assert "arm carries 200 g more" in tie.said()
-    assert "spring" not in tie.said()
+    tie = GravityOverTorque((JOINT,), Estimate(1.3, 1.2, 1.4, "1"), 0.9, names, False, OPTIONS.occam)
+    assert "arm carries 200 g more" in tie.in_words()
+    assert "spring" not in tie.in_words()
     assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]

@@ -7,7 +7,7 @@ import numpy as np
 from tests.evidence.rig_logs import record
 from workbench.compare.session_takes import read_takes
 from workbench.identify.options import PROBLEM
-from workbench.identify.preparation import prepared
+from workbench.identify.preparation import prepare
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.simulation import SimulationConfig
 
@@ -16,7 +16,7 @@ def test_a_log_that_was_recorded_elsewhere_is_rolled_out_anew(tmp_path):
     """Two logs of the same commands and start, of which one ends otherwise, share whole rollouts but no windows."""
     session = record(tmp_path)
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
-    evidence = prepared(session, read_takes(session)[0][:1], config, 1, lambda *_: None).evidence
+    evidence = prepare(session, read_takes(session)[0][:1], config, 1, lambda *_: None).evidence
     (e,) = evidence
     late = e.take.recorded.since_start > 1.0
     q = e.take.recorded.q + np.where(late, 0.2, 0.0)[:, None]

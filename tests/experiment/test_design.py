@@ -11,7 +11,7 @@ from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, Path, gravity_torque, long_runs
 from workbench.experiment.projection import Shown
 from workbench.experiment.rivals import Pair
-from workbench.experiment.segment import joined
+from workbench.experiment.segment import join
 from workbench.experiment.stance import BodyMoves
 from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import EffectSpec, foot_points, puppy_model
@@ -33,7 +33,7 @@ def test_all_pieces_keep_the_servos_limits_and_begin_and_end_in_neutral(puppy):
     pieces = [*JointMoves(model, reach, ["flb"]).segments(), *JointMoves(model, reach, ["flm", "frb"]).segments(),
               *long_runs(model, reach, ["flb", "frb"], 12.0), *BodyMoves(model, reach).segments()]
     assert len(pieces) > 20
-    for s in [*pieces, joined(pieces[:3])]:
+    for s in [*pieces, join(pieces[:3])]:
         table = Motion(s.name, s.times, model.joints, s.angles).as_table()
         assert [v for v in check_limits(table, model) if not v.warning] == [], s.name
         assert not s.angles[[0, -1]].any(), s.name
@@ -48,7 +48,7 @@ def test_no_leg_is_sent_into_another(puppy):
     assert sorted(reach.clear(q)) == [False, True]
     closing = Path(model.joints, reach.speeds).to({j: q[list(reach.clear(q)).index(False), model.joints.index(j)]
                                                    for j in ("flt", "frt")}).home().segment("closing")
-    smaller = reach.cleared(closing)
+    smaller = reach.scaled_clear(closing)
     assert smaller is None or 0 < np.abs(smaller.angles).max() < np.radians(40)
 
 
@@ -107,7 +107,7 @@ def test_a_difference_that_a_rival_can_imitate_does_not_count():
     assert end.x == pytest.approx([x])
     assert end.left == pytest.approx([30 - 30 * x, 40])
     assert show.chi_squared() == end.cost == pytest.approx((30 - 30 * x) ** 2 + 1600 + x**2)
-    both = Shown.joined([show, shown([0, 0], [0, 0], np.zeros((2, 0)), [[300], [0]])])
+    both = Shown.join([show, shown([0, 0], [0, 0], np.zeros((2, 0)), [[300], [0]])])
     assert both.chi_squared() > 2480, "what imitates in one piece gives itself away in the next"
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from workbench.files import InputError
 from workbench.gait.drive.controller import CycleController, limited
-from workbench.gait.drive.observer import BIAS, P11, first_state, observed
+from workbench.gait.drive.observer import BIAS, GAIN, P11, PLAYED, first_state, observed
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, corridor, plan
@@ -59,10 +59,10 @@ def test_without_binding_limits_the_plan_is_the_least_squares_solution() -> None
 
     def rolled(u: np.ndarray) -> np.ndarray:
         y, e, last, rows = left, heading - targets[0], before, []
-        for j in range(N):
+        for j, bend in enumerate(np.diff(targets)):
             rows += [y / o.aside, e / o.turned, (u[j] - last) / o.change]
-            turned = MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - np.diff(targets)[j]
-            y, e = y + MAP.ahead * e + MAP.aside + MAP.aside_gain * u[j], e + turned
+            turned = MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - bend
+            y, e = y + MAP.ahead * (e - bend / 2) + MAP.aside + MAP.aside_gain * u[j], e + turned
             last = u[j]
         return np.array([*rows, y / o.aside, e / o.turned])
 
@@ -119,6 +119,35 @@ def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
         x = observed(x, np.array([0.0, 0.0, heading]), 0.0, replace(MAP, scatter=(1e-4, 0.0)), o)
     assert x[BIAS] == pytest.approx(0.03, abs=1e-4)
     assert np.sqrt(x[P11]) < 1e-3
+
+
+def test_the_observer_separates_gain_from_bias() -> None:
+    """Of a robot that turns by a third more than the map says, and by 2 deg a cycle on its own."""
+    o, rng = DriveOptions(drift=1e-6, first_gain=0.5), np.random.default_rng(0)
+    x, heading, before = first_state(MAP, o), 0.0, 0.0
+    for turn in rng.uniform(-0.15, 0.15, 60):
+        heading += 0.035 + 4 / 3 * (MAP.gain * turn + MAP.memory * before)
+        x[PLAYED] = turn
+        x = observed(x, np.array([0.0, 0.0, heading]), before, replace(MAP, scatter=(1e-3, 0.0)), o)
+        before = turn
+    assert x[GAIN] == pytest.approx(1 / 3, abs=0.02)
+    assert x[BIAS] == pytest.approx(0.035, abs=0.002)
+
+
+def test_on_an_arc_that_the_map_follows_exactly_there_is_nothing_to_correct() -> None:
+    """A cycle that turns evenly moves aside by half of ahead times its turn, and so does the arc."""
+    m, bend = replace(MAP, memory=0.0, gain=1.0, aside_gain=MAP.ahead / 2), 0.06
+    o = DriveOptions()
+    planned = plan(0.0, 0.0, bend, 0.0, bend * np.arange(o.horizon + 1), m, o)
+    assert planned.turns == pytest.approx(np.full(o.horizon, bend), abs=1e-6)
+    assert planned.left == pytest.approx(np.zeros(o.horizon + 1), abs=1e-7)
+
+
+def test_a_path_begins_straight_and_bends_without_kinks() -> None:
+    path = WayPath([(0.6, 0.15), (1.2, -0.15), (1.7, 0.1)])
+    bend = np.gradient([path.heading(s) for s in path.s], path.s)
+    assert abs(bend[1]) < 0.2
+    assert np.abs(np.diff(bend)).max() < 0.2
 
 
 def test_a_robot_that_the_cameras_lost_is_stopped() -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.effects.apply import played
+from workbench.effects.apply import apply_to_commands
 from workbench.motion import load_motion
 from workbench.robot import EffectSpec, data_file, puppy_model
 
@@ -13,7 +13,7 @@ def test_each_servo_gets_its_poses_late_by_its_own_delay_without_instants_that_c
     model = puppy_model()
     commands = load_motion(data_file("robotis_walk.csv"), model).commands(3)
     delays = {j: 0.017 + 0.002 * i for i, j in enumerate(model.joints)}
-    late = played(commands, replace(model, effects=tuple(
+    late = apply_to_commands(commands, replace(model, effects=tuple(
         EffectSpec("command_delay", (j,), {"delay": d}) for j, d in delays.items())))
     assert len(late.times) <= len(commands.times) * (len(model.joints) + 1)
     at = np.linspace(0.0, commands.end, 700)

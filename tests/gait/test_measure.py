@@ -39,7 +39,7 @@ def test_speed_turn_and_torque_of_a_glide():
     assert not m.fell
     assert m.jerk < 0.2
     assert m.power == pytest.approx(16 * 0.05 * 11.1)  # no duty: what servos and controller take at rest
-    assert m.drift_per_metre == pytest.approx(0.5 * 3.5 / m.gone)
+    assert m.drift == pytest.approx(0.5 * 3.5)
 
 
 def test_a_tilted_or_sunken_body_fell():

@@ -8,11 +8,13 @@ import pytest
 
 from workbench.files import InputError
 from workbench.gait.evaluate import Evaluator
+from workbench.gait.limits import Margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.refine import RefineOptions, gauss_newton, refined
 from workbench.gait.request import Request
 from workbench.gait.search import Found
 from workbench.gait.shape import GaitShape
+from workbench.gait.table import gait_table
 from workbench.robot import puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
@@ -55,6 +57,28 @@ def test_what_does_not_go_straight_is_left_as_it_is(evaluator):
     turning = Evaluator(evaluator.machine, Request("turn", 0.5), (), n_jobs=1)
     assert refined(turning, found, SMALL, silent) is found
     assert refined(evaluator, found, replace(SMALL, iterations=0), silent) is found
+
+
+def test_parts_of_a_change_that_breaks_a_limit_are_tried_and_kept_in_order(evaluator, better, monkeypatch):
+    offsets = np.array(better.offsets)
+
+    class Strict(Evaluator):
+        """Refuses whole changes, and calls the rest the faster the larger the change."""
+
+        def judged(self, shapes, draws, keep=None):
+            out = []
+            for s in shapes:
+                part = np.abs(np.array(s.offsets)).max() / np.abs(offsets).max() if s.offsets else 0.0
+                limit = Margin("foot clearance over draws", "robot", 2.0, 3.0, "mm", 1.3 if part > 0.9 else 0.5)
+                out.append(replace(start, table=gait_table(self.machine, s), margins=(limit,), cost=1.0 - part))
+            return out
+
+    (start,) = evaluator.judged([SHAPE], 0)
+    start = replace(start, margins=(), cost=1.0)
+    monkeypatch.setattr("workbench.gait.refine.gauss_newton", lambda *_: better)
+    strict = Strict(evaluator.machine, Request(), (), n_jobs=1)
+    found = refined(strict, Found(start, None, 0, 0), replace(SMALL, parts=(1.0, 0.6, 0.3)), silent)
+    assert [round(c.cost, 2) for c in (found.best, *found.others)] == [0.4, 0.7, 1.0]
 
 
 def test_options_out_of_range_are_refused():

@@ -1,4 +1,4 @@
-"""The search: deterministic, goes on after it was killed, keeps limits by rank, and says what binds."""
+"""The search: deterministic, resumes after it was killed, keeps limits by rank, and says what binds."""
 
 import json
 from dataclasses import replace
@@ -120,6 +120,18 @@ def test_every_gait_that_counts_was_tried_on_the_ensemble_from_the_first_generat
     assert all(len(c.draws) == 2 for c in found.others)
 
 
+def test_a_search_begins_at_the_gait_it_is_given(machine):
+    start = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
+    evaluator = Evaluator(machine, Request(), [])
+    one = replace(SMALL, seeds=0, draws=0, generations=1)
+    found = search(evaluator, one, 1, quiet, (start,))
+    (walked,) = steered(evaluator, space_of(machine, Request()), evaluator.judged([start], 0))
+    assert (found.best.shape.family, found.best.shape.knees) == ("trot", (1, 1))
+    assert found.best.rank() <= walked.rank()
+    with pytest.raises(InputError, match="a gait to start from"):
+        search(evaluator, one, 1, quiet)
+
+
 def test_every_seed_is_within_reach_and_ranges(machine):
     space = space_of(machine, Request())
     for paths in paths_of(machine, seeds(machine, Request(), space, 12, 2)):
@@ -146,7 +158,7 @@ def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
 
 
 def test_finalists_are_tried_one_after_the_other_on_fresh_robots_until_one_holds(machine, tmp_path):
-    """The search's best is too slow as the certificate walks, what comes after it is not."""
+    """The best gait of the search is too slow in the longer walk of the certificate; the next one is fast enough."""
     fresh = load_ensemble().draws(machine.model, 3, 9, tmp_path)
     limits = replace(Request().limits, drift=10.0, aside=10.0, tilt=3.0, slip=50.0, lift=1e-6, spread=100.0)
     lax = Request(limits=limits)
@@ -252,4 +264,6 @@ def test_options_that_cannot_be_met_end_in_one_line(capsys, tmp_path):
     assert STANDING in refused(capsys, "optimize", "--rms", "0.001", "--speed", "0.1", *out)
     assert "neither of them max" in refused(capsys, "optimize", "--turn", "max", "--speed", "0.1", *out)
     assert "expected sideways, turn or arc" in refused(capsys, "optimize", "--right", *out)
+    assert "the certificate is missing" in refused(capsys, "optimize", "--start", str(tmp_path / "gait.csv"), *out)
+    assert "expected a method that searches" in refused(capsys, "optimize", "--start", "x.csv", "--method", "plan", *out)
     assert not (tmp_path / "out" / "gait.csv").exists()

@@ -9,6 +9,7 @@ from workbench.files import InputError
 from workbench.motion import Commands, load_motion
 from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation.compiled import CompiledSteppedRun, stepped
 
 FIELDS = ("time", "q", "v", "p_WB", "quat_WB", "torque")
 
@@ -85,3 +86,19 @@ def test_a_run_ends_the_stepped_one_before_it(station, walk):
 def test_refuses_a_base_on_a_path():
     with pytest.raises(InputError, match="free or fixed"):
         Simulation(puppy_model(), SimulationConfig(base="path")).stepped()
+
+
+def test_commands_that_no_delay_reaches_back_to_make_no_difference(walk, monkeypatch):
+    """The delay of one servo is added to the delay of every servo; the run is advanced in pieces of 0.1 s."""
+    config = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
+    delays = (EffectSpec("command_delay", ("flm",), {"delay": 0.03}), EffectSpec("command_delay", (), {"delay": 0.02}))
+    takes = []
+    for back in (0.1, np.inf):
+        monkeypatch.setattr(stepped, "LOOK_BACK", back)
+        run = CompiledSteppedRun(puppy_model(effects=delays), config)
+        for first in np.arange(0.0, 1.0, 0.1):
+            run.send(part(walk, first, first + 0.1))
+            run.advance(0.1)
+        takes.append(run.take())
+    for field in ("q", "v", "p_WB", "quat_WB"):
+        np.testing.assert_array_equal(getattr(takes[0], field), getattr(takes[1], field), err_msg=field)

@@ -6,20 +6,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.command import refused
+from tests.command import refused, succeeds
 from workbench.files import InputError
 from workbench.gait.evaluate import SEARCH, Evaluator
+from workbench.gait.examine import CertifyOptions
 from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import OptimizeOptions
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.shape import GaitShape
-from workbench.gait.straighten import METRES, Straightener, heading_gain, summary_of_straightened, turned_by
+from workbench.gait.straighten import (
+    LEAST_GAIN_SPREAD,
+    METRES,
+    Straightener,
+    TurnResponse,
+    summary_of_straightened,
+    turn_response,
+    turned_by,
+)
 from workbench.gait.table import gait_table
 from workbench.gait.trim import turn_in
 from workbench.gait.turning import MOST_TRIM, TurnEstimate, recorded_turn
+from workbench.motion import load_motion
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
-from workbench.robot import EffectSpec, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import Job
 from workbench.simulation.compiled import CompiledJob
 
@@ -47,6 +58,7 @@ def test_recorded_heading_is_that_of_the_walk_between_its_rests():
     assert math.degrees(turn.heading) == pytest.approx(30, abs=1)
     assert turn.metres == pytest.approx(0.6, abs=0.1)
     assert turn.cycles >= 6
+    assert turn.speed == pytest.approx(0.2, rel=0.05)
 
 
 def test_gaps_do_not_matter_and_too_short_a_walk_is_refused():
@@ -72,14 +84,14 @@ def test_estimate_weighs_the_recording_by_its_scatter_and_learns_the_gain():
 
 def test_a_crooked_robot_is_straightened_by_what_it_records(machine):
     request = Request()
-    gain, speed = heading_gain(machine, request, SHAPE)
-    walks = Straightener(machine.model, request, SHAPE, speed, gain, 0.8, SEARCH.time_step).robots(
+    response = turn_response(machine, request, SHAPE)
+    walks = Straightener(machine.model, request, SHAPE, response, 0.8, SEARCH.time_step).robots(
         [machine.model.with_effects((CROOKED,))])
     degrees = np.degrees(walks[0])
     assert len(degrees) == METRES + 1
     assert abs(degrees[0]) > 10
     assert abs(degrees[METRES]) < 3
-    assert summary_of_straightened(walks, gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
+    assert summary_of_straightened(walks, response.nominal_gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
 
 
 def test_turn_is_taken_back_as_far_as_legs_reach(machine):
@@ -91,21 +103,63 @@ def test_turn_is_taken_back_as_far_as_legs_reach(machine):
 
 def test_a_turn_in_place_has_nothing_to_straighten(machine):
     with pytest.raises(InputError, match="no heading to straighten"):
-        heading_gain(machine, Request(way="turn"), SHAPE)
+        turn_response(machine, Request(way="turn"), SHAPE)
+
+
+def test_a_slow_robot_turns_farther_in_a_metre_for_the_same_change(machine):
+    response = TurnResponse(rate=4.0, speed=0.2, share=0.8)
+    assert response.nominal_gain == pytest.approx(20.0)
+    assert response.gain(0.2) == pytest.approx(16.0)
+    assert response.gain(0.1) == pytest.approx(32.0)
+    robot = machine.model.with_effects((EffectSpec("ground_friction", (), {"friction": 0.3}),))
+    alone, told = turn_response(machine, Request(), SHAPE), turn_response(machine, Request(), SHAPE, [robot] * 4)
+    assert (alone.share, alone.rate) == (1.0, told.rate)
+    assert told.share == pytest.approx(turn_response(GaitMachine(robot), Request(), SHAPE).rate / alone.rate)
+    assert abs(told.share - 1) > 0.02
+    assert told.sd == LEAST_GAIN_SPREAD
+
+
+def record(path, robot, commands, seconds):
+    """The base's rigid body of a robot that plays the commands, as Motive would export it."""
+    take = CompiledJob(Job(robot, SEARCH, commands, seconds, 0.3)).take()
+    w, x, y, z = take.quat_WB.T  # capture axes: x forward, y up, z right
+    asset = next(a for a, link in robot.rigid_bodies.items() if link == robot.base)
+    body = BodyTrack(take.p_WB[:, [0, 2, 1]] * [1, 1, -1], np.column_stack([w, x, z, -y]))
+    write_motive(path, {asset: body}, 1 / float(np.median(np.diff(take.time))))
 
 
 def test_mocap_of_the_base_shows_what_the_rollout_does(machine, tmp_path):
     robot = machine.model.with_effects((CROOKED,))
     table = gait_table(machine, SHAPE)
-    take = CompiledJob(Job(robot, SEARCH, table.commands(8), table.start_seconds + 8 * table.period, 0.3)).take()
-    w, x, y, z = take.quat_WB.T  # capture axes: x forward, y up, z right
-    asset = next(a for a, link in robot.rigid_bodies.items() if link == robot.base)
-    body = BodyTrack(take.p_WB[:, [0, 2, 1]] * [1, 1, -1], np.column_stack([w, x, z, -y]))
-    write_motive(tmp_path / "walk.csv", {asset: body}, 1 / float(np.median(np.diff(take.time))))
+    record(tmp_path / "walk.csv", robot, table.commands(8), table.start_seconds + 8 * table.period)
     seen = turn_in(tmp_path / "walk.csv", machine.model, table.period)
     (walked,) = Evaluator(machine, Request(), (), n_jobs=1).measured([(SHAPE, robot)])
     assert math.degrees(seen.heading) == pytest.approx(math.degrees(drift(Request(), walked)), abs=4)
     assert seen.sd < math.radians(5)
+
+
+@pytest.mark.slow
+def test_the_command_straightens_a_crooked_robot_from_its_recording(machine, tmp_path, capsys, monkeypatch):
+    brief = CertifyOptions(draws=0, checked=0, seconds=2.0, step=2e-3, floor_seconds=0.5, watched=0, trimmed=0, n_jobs=1,
+                           variants=("2 ms",))
+    monkeypatch.setattr("workbench.gait.optimize.options_of", lambda *_: OptimizeOptions(certify=brief))
+    monkeypatch.setattr("workbench.gait.engines.other_engine", lambda: None)
+    model, gait = machine.model, data_file("gaits") / "plan-0.15" / "gait.csv"
+    robot = model.with_effects((CROOKED,))
+
+    def heading_of(motion, name):
+        played = load_motion(motion, model)
+        commands = played.commands(24)
+        record(tmp_path / name, robot, commands, commands.end)
+        return math.degrees(turn_in(tmp_path / name, model, played.as_table().period).heading)
+
+    before = heading_of(gait, "walk.csv")
+    said = succeeds(capsys, "trim", str(tmp_path / "walk.csv"), "--gait", str(gait), "--out", str(tmp_path / "out"))
+    assert f"recorded: {before:+.1f} deg/m" in said
+    assert {"gait.csv", "certificate.json", "report.html"} <= {f.name for f in (tmp_path / "out").iterdir()}
+    after = heading_of(tmp_path / "out" / "gait.csv", "again.csv")
+    assert abs(before) > 20
+    assert abs(after) < abs(before) / 3
 
 
 def test_trim_refuses_a_gait_without_its_certificate(tmp_path, capsys):

@@ -8,7 +8,7 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.identify.loads import steady_loads, unloaded_joints
 from workbench.identify.options import PROBLEM
-from workbench.identify.preparation import prepared
+from workbench.identify.preparation import prepare
 from workbench.identify.proposals import candidates
 from workbench.identify.unobservable import HELD, NO_CAMERA, unobservable
 from workbench.simulation import SimulationConfig
@@ -22,7 +22,7 @@ def logged(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rig")
     session = record(folder)
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
-    return folder, session.model, prepared(session, read_takes(session)[0][:1], config, 1, lambda *_: None).evidence
+    return folder, session.model, prepare(session, read_takes(session)[0][:1], config, 1, lambda *_: None).evidence
 
 
 def test_an_arm_that_hangs_is_loaded_by_its_weight(logged):

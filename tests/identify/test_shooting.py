@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from workbench.identify.options import PROBLEM
-from workbench.identify.shooting import base_states, edges, unsettled
+from workbench.identify.shooting import base_states, edges, unsettled_frames
 from workbench.recording.take import Take
 
 SPEED, TURNING = np.array([0.05, -0.02, 0.01]), np.array([0.1, -0.2, 0.8])
@@ -60,7 +60,7 @@ def test_frames_after_an_edge_tell_nothing_until_feet_have_found_the_floor(walk:
     states = base_states(walk)
     assert states is not None
     since = walk.since_start
-    told = since[~unsettled(states, since)]
+    told = since[~unsettled_frames(states, since)]
     after = told[:, None] - states.times
     assert not ((after >= 0) & (after < PROBLEM.settles)).any()
     assert len(told) > 0.75 * len(since)

@@ -15,7 +15,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
-from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
+from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -133,7 +133,7 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     def judging(third):
         met = residuals[0].copy()
         met[:, k] = np.where(e.moving & (third == part), 40.0, 0.1)
-        (seen, _) = rebalanced(evaluator.evidence, {0: met, 1: residuals[1]})
+        (seen, _) = rebalance(evaluator.evidence, {0: met, 1: residuals[1]})
         assert (seen.uses["validate"] == e.uses["validate"]).all()
         assert not (seen.uses["fit"] & seen.uses["choose"]).any()
         assert ((seen.uses["fit"] | seen.uses["choose"]) == (e.uses["fit"] | e.uses["choose"])).all()
@@ -142,5 +142,18 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     assert judging(0) == {0}
     assert judging(2) == {2}
     assert judging(PROBLEM.deciding_part) == {PROBLEM.deciding_part}
-    assert rebalanced(evaluator.evidence, residuals) == list(evaluator.evidence)
-    assert rebalanced(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)
+    assert rebalance(evaluator.evidence, residuals) == list(evaluator.evidence)
+    assert rebalance(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)
+
+
+def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones(two):
+    _, evaluator, _ = two
+    evidence = list(evaluator.evidence)
+    whole = sum(float(e.since[-1]) for e in evidence)
+    assert at_most(evidence, whole + 0.1) == evidence
+    shorter = at_most(evidence, 2.0)
+    assert [e.until for e in shorter] == pytest.approx([1.0, 1.0])
+    assert all(len(e.recorded) < len(w.recorded) and not (e.uses["fit"] & (e.since > e.until)).any()
+               for e, w in zip(shorter, evidence))
+    judging = replace(evidence[1], uses=dict.fromkeys(evidence[1].uses, np.zeros(len(evidence[1].recorded), dtype=bool)))
+    assert [e.until for e in at_most([evidence[0], judging], 2.0)] == pytest.approx([2.0, 0.0])

@@ -66,7 +66,7 @@ def test_a_sign_in_a_bit_is_told(tmp_path: Path) -> None:
     (lambda t, g, p: (t, p, p), "equals position.arm in every row"),
     (lambda t, g, p: (t, 0 * g, p), "was the command recorded?"),
     (lambda t, g, p: (np.where(t > 1, t + 0.5, t), g, p), "pause(s) without rows, the longest 0.52 s from 1.000 s"),
-    (lambda t, g, p: (t, 57.3 * g, 57.3 * p), "more than 2 turns"),
+    (lambda t, g, p: (t, 57.3 * g, 57.3 * p), "more than 1.25 turns"),
 ])
 def test_what_the_numbers_cannot_mean_is_told(tmp_path: Path, change, said: str) -> None:
     assert any(said in p for p in _read(tmp_path, *change(*swing())).problems)

@@ -16,7 +16,7 @@ from workbench.effects.apply import physics_of
 from workbench.files import InputError
 from workbench.inspect.recognise import inspect_file
 from workbench.robot import EffectSpec, Kinematics, RobotModel
-from workbench.robot.model_source import model_problems, prepared
+from workbench.robot.model_source import model_problems, prepare
 from workbench.simulation import MakeStation
 from workbench.simulation.compiled import kernel
 
@@ -152,7 +152,7 @@ def test_an_impossible_inertia_is_drakes_ball_of_water(tmp_path: Path) -> None:
     """The message names the replacement."""
     path = _robot(tmp_path, ROBOT.replace('ixx="3e-5" iyy="3e-5" izz="3e-6"', 'ixx="3e-5" iyy="3e-6" izz="3e-6"', 1))
     plant = MultibodyPlant(0.0)
-    Parser(plant).AddModels(str(prepared(path).path))
+    Parser(plant).AddModels(str(prepare(path).path))
     plant.Finalize()
     shank = plant.GetBodyByName("shank")
     radius = (0.03 / 1000 / (4 / 3 * np.pi)) ** (1 / 3)

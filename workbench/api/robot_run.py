@@ -66,7 +66,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
         raise InputError(None, f"stopped: {played.stopped}; there is no joint log: {played.log_problem}")
     if virtual is not None and played.poses:
         tell("the cameras' recording", None)
-        capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
+        capture = _film(virtual, played, folder / f"{name}.csv", seed)
     save_registers(registers, folder / "registers.yaml")
     save_motion(motion, folder / f"{name}_motion.csv")
     takes = _takes(name, cycles, base, played, capture)
@@ -101,7 +101,7 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
         capture = None if background is None else background.stop(played.ended if played else None)
     if virtual is not None:
         tell("the cameras' recording", None)
-        capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
+        capture = _film(virtual, played, folder / f"{name}.csv", seed)
     save_motion(motion, folder / f"{name}_motion.csv")
     table_said = {"motion": f"{name}_motion.csv", "cycles": cycles, "base": base}
     takes = [{"name": name, "recording": f"{name}.csv", **table_said}] if capture is not None else []
@@ -114,7 +114,7 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
     return RobotRun(session, tuple(takes), played, capture, tuple(warnings))
 
 
-def _filmed(virtual: VirtualRobot, played: Played | ControllerRun, take: Path, seed: int) -> Capture:
+def _film(virtual: VirtualRobot, played: Played | ControllerRun, take: Path, seed: int) -> Capture:
     names, scene, begin, end = virtual.scene(played.started, seed)
     motive = VirtualMotive(names, scene, rate=COMPARE.camera_rate, started=begin, seed=seed)
     seconds = end - begin - 1 / COMPARE.camera_rate

@@ -153,7 +153,7 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
     takes in SI units and radians, world x forward, y left, z up. A damaged take is left out and named in `comparison.left_out`;
     InputError for bad input, for a `model` with other links or joints, or where no take remains.
     """
-    session = _loaded(session)
+    session = _load(session)
     session = session if model is None else session.with_model(model)
     return ComparisonResult(comparing.compare_session(session, config, progress=progress, n_jobs=jobs, finer_steps=finer_steps),
                             session)
@@ -169,7 +169,7 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
     take is left out and named in `diagnosis.left_out`; InputError for bad input, or where no take remains.
     """
     options = options or DiagnoseOptions()
-    session = _loaded(session)
+    session = _load(session)
     previous = None if options.previous is None else load_model(options.previous)
     found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without, previous,
                              options.engine)
@@ -186,11 +186,11 @@ def predict(session: Session | str | PathLike[str], folder: str | PathLike[str],
     called with the stage and the share done. jobs: processes that simulate. InputError for bad input, or a session without
     `predict`.
     """
-    session = _loaded(session)
+    session = _load(session)
     Path(folder).mkdir(parents=True, exist_ok=True)
     found = predict_session(session, model or session.model, Path(folder), progress, config=config, n_jobs=jobs)
     return PredictionResult(found.takes, found.paths, found.left_out)
 
 
-def _loaded(session: Session | str | PathLike[str]) -> Session:
+def _load(session: Session | str | PathLike[str]) -> Session:
     return session if isinstance(session, Session) else load_session(Path(session))

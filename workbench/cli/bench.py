@@ -14,14 +14,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "bench",
         help="measure the speeds stated in the documentation",
-        description="Prints as JSON, each figure with its target, all measured in one run in alternation: the station with the "
+        description="Prints each figure with its target as JSON, all measured alternately in one run: the station with the "
         "full servo law against a bare Drake plant with PD control at the same step, and against MuJoCo at the same joint "
         "error; the fast servo and larger steps; the Motive reader against pandas; 64 rollouts on two processes against one; a "
         "fit against MuJoCo's system identification; where a diagnosis spends its time. Takes minutes, and needs a quiet "
         "machine.",
     )
-    parser.add_argument("--quick", action="store_true", help="only see that all of it runs, in seconds; the figures mean nothing")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="write the JSON there too")
+    parser.add_argument("--quick", action="store_true", help="smoke test of a few seconds; the figures are meaningless")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON to FILE")
     parser.set_defaults(run=run)
 
 

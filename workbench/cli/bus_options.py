@@ -30,7 +30,8 @@ def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None
     parser.add_argument("--robot", metavar="FILE",
                         help=f"with --port {VIRTUAL}: ground-truth model of the emulated robot: a model.yaml "
                              "with effects (default: the model)")
-    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="the robot stands on its feet, or is held")
+    parser.add_argument("--base", choices=("free", "fixed"), default="free",
+                        help="free: standing on its feet; fixed: held (default: free)")
 
 
 def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | None:

@@ -13,7 +13,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "demo",
         help="simulate, compare, diagnose and find a gait on bundled data, with a report to open at the end",
         description="Plays the ROBOTIS walk with the servo law and with ideal joints, in point and in hydroelastic contact, "
-        "compares it with a bundled synthetic recording, finds the physics that is missing from the model of an arm, writes the "
+        "compares it with a bundled synthetic recording, finds the physics missing from the model of an arm, writes the "
         "walk as firmware tables, searches for a new gait, and puts all of it into one report. A few minutes.",
     )
     add_out(parser, default="runs/demo")

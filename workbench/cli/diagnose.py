@@ -64,7 +64,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
-    from workbench.view.report.words import hidden_effects
+    from workbench.view.report.words import hidden_effects, said_aside
 
     session, before = load_session(path), None if previous is None else Path(previous)
     told = check_session("diagnose", session, yes)
@@ -77,12 +77,14 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")
+    for tied in diagnosis.tied:
+        print(f"  {tied.in_words()}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
-    for tied in diagnosis.tied:
-        print(f"  {tied.said()}")
     for unknown in diagnosis.unknown_torques:
         print(f"  {unknown_line(unknown)}")
+    for sentence in said_aside(diagnosis.provenance):
+        print(f"  {sentence.rstrip('.')}")
     for sentence in hidden_effects(diagnosis.provenance.get("cannot_show", {})):
         print(f"  {sentence.replace('**', '').rstrip('.')}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
@@ -102,6 +104,8 @@ def finding_line(finding: Finding) -> str:
 
     tie, error = finding.tie, finding.validation
     other = f" {this_or(tie)}, which these recordings cannot separate" if tie else ""
+    if finding.of_tie is not None:
+        other = f", as one of several names of gravity over torque, {finding.of_tie:.2f} together"
     family = "" if finding.family is None else f", {finding.family.name} {finding.family.confidence:.2f}"
     return f"{finding.evidence} (confidence {finding.together:.2f}{other}{family}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"

@@ -12,7 +12,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "doctor",
         help="check this installation and suggest fixes",
         description="Checks versions, cores, memory, disk, the cache of compiled rollouts, Meshcat, the second engine and shell "
-        "completion, and suggests how to install anything missing. Exits with 2 where something keeps the workbench from "
+        "completion, and suggests how to install anything missing. Exits with 2 if something prevents the workbench from "
         "working.")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--compile", action="store_true",

@@ -44,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--certify", action="store_true", help="certify the gait's turns over random robots, as --port requires, "
                         "and write family.json into the gait's folder; no way-points")
     parser.add_argument("--avoid", metavar="X,Y,R", type=_disc, action="append", default=[],
-                        help="a disc on the floor to walk around, centre and radius [m]; may be repeated")
+                        help="a disc on the floor to walk around, centre and radius [m]; repeatable")
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")
     truth.add_argument("--draw", type=int, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
@@ -61,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--image", metavar="FILE", help=f"with --port {VIRTUAL}: the program in the emulated CM-530")
     parser.add_argument("--motive", metavar="HOST", help="with --port: computer that runs Motive")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
-    parser.add_argument("--force", action="store_true", help="with --port: drive although the gait's certificate does not hold")
+    parser.add_argument("--force", action="store_true", help="with --port: drive even if the gait's certificate is not valid")
     add_out(parser, default="runs/drive")
     parser.set_defaults(run=run)
 
@@ -83,18 +83,18 @@ def run(args: argparse.Namespace) -> int:
         return _certify(args, family)
     path = WayPath(args.points)
     _check_port(args, model)
-    certified = _certified(args, model)
+    certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
     if certified:
         options = replace(options, most=certified.most, most_change=certified.most_change)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
-        step_map = certified.step_map if certified else _fitted(args, family, progress)
+        step_map = certified.step_map if certified else _fit_map(args, family, progress)
         controller = CycleController(path, step_map, family.period, options, [Disc(*d) for d in args.avoid])
         watch = _viewer(model, controller) if args.view else None
         code, straight = 0, None
         if args.port is None:
-            closed, straight = (_simulated(args, family, robot, controller, progress, steer, watch) for steer in (True, False))
+            closed, straight = (_simulate(args, family, robot, controller, progress, steer, watch) for steer in (True, False))
         else:
             code, closed = _on_robot(args, model, robot, family, controller, folder, progress, watch)
         progress("drawing")
@@ -124,7 +124,7 @@ def _certify(args: argparse.Namespace, family: GaitFamily) -> int:
     return 0 if certificate.kept else 2
 
 
-def _certified(args: argparse.Namespace, model: RobotModel) -> FamilyCertificate | None:
+def _load_certificate(args: argparse.Namespace, model: RobotModel) -> FamilyCertificate | None:
     """The family's certificate; None where it is not required (in simulation, or with --force) and missing or not valid."""
     from workbench.cli.progress import warn
     from workbench.files import InputError
@@ -140,7 +140,7 @@ def _certified(args: argparse.Namespace, model: RobotModel) -> FamilyCertificate
         return None
 
 
-def _fitted(args: argparse.Namespace, family: GaitFamily, progress: Callable[..., None]) -> StepMap:
+def _fit_map(args: argparse.Namespace, family: GaitFamily, progress: Callable[..., None]) -> StepMap:
     from workbench.gait.drive.step_map import fit_step_map
 
     progress("fitting the step-to-step map")
@@ -165,7 +165,7 @@ def _check_port(args: argparse.Namespace, model: RobotModel) -> None:
     check_certificate_of("drive", args.gait, load_motion(args.gait, model), model, args.force)
 
 
-def _simulated(args: argparse.Namespace, family: GaitFamily, robot: RobotModel, controller: CycleController,
+def _simulate(args: argparse.Namespace, family: GaitFamily, robot: RobotModel, controller: CycleController,
                progress: Callable[..., None], steer: bool, watch: Any) -> Driven:
     from workbench.gait.drive.loop import drive
     from workbench.gait.drive.walk import Cameras, SimulatedWalk

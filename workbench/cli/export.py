@@ -16,14 +16,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "export",
         help="turn a motion into the robot's firmware tables",
         description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt, motion.h and motion.table. "
-        "The motion is "
-        "played on the simulated robot first; what breaks a servo's range, speed or torque, or was made by optimize and lacks "
-        "its certificate, is refused unless --force.",
+        "It is first played on the simulated robot: a motion that exceeds a servo's range, speed or torque, or that optimize "
+        "wrote and whose certificate is missing, is refused unless --force is given.",
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
     add_cycles(parser, 3)
-    parser.add_argument("--force", action="store_true", help="write the tables although a limit is broken, with a warning")
+    parser.add_argument("--force", action="store_true", help="write the tables even if a limit is broken, with a warning")
     add_yes(parser)
     add_out(parser)
     parser.set_defaults(run=run)

@@ -26,13 +26,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     how_long = parser.add_mutually_exclusive_group()
     how_long.add_argument("--cycles", type=positive, metavar="N",
                           help="stop in neutral after N cycles (default: the motion's own, or 10)")
-    how_long.add_argument("--endless", action="store_true", help="repeat until a person stops it")
-    parser.add_argument("--force", action="store_true", help="although a limit is broken, with a warning")
-    parser.add_argument("--yes", action="store_true", help="do not ask before the program in the controller is replaced")
-    parser.add_argument("--dry-run", action="store_true", help="do all but open the port, and say what would be sent")
+    how_long.add_argument("--endless", action="store_true", help="repeat until stopped by hand")
+    parser.add_argument("--force", action="store_true", help="continue even if a limit is broken, with a warning")
+    parser.add_argument("--yes", action="store_true", help="replace the program in the controller without asking")
+    parser.add_argument("--dry-run", action="store_true", help="do everything except open the port, and print what would be sent")
     parser.add_argument("--loader", metavar="FILE", help="texts of the loader (default: data/loaders/cm530.yaml)")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("runs/flash"),
-                        help="for image, table and transcript (default: runs/flash)")
+                        help="folder for image, table and transcript (default: runs/flash)")
     parser.set_defaults(run=run)
 
 
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
               f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
               f"{profile.keep.decode()} and {profile.start.decode()}, and wait for the program's word; no port was opened")
         return 0
-    if not args.yes and not _agreed():
+    if not args.yes and not _confirm():
         raise InputError("flash", "not loaded: say yes, or give --yes")
     line = _line(args.port, profile.rate)
     transcript = Transcript()
@@ -96,7 +96,7 @@ def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its m
     return line
 
 
-def _agreed() -> bool:
+def _confirm() -> bool:
     if not sys.stdin.isatty():
         return False
     return input("Replace the program in the controller? [yes/no] ").strip().lower() == "yes"

@@ -77,8 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         apply_defaults(_verbs(parser))
     except ValueError as e:
-        return _refused("workbench", e)
-    args = _parsed(parser, sys.argv[1:] if argv is None else list(argv))
+        return _report("workbench", e)
+    args = _parse(parser, sys.argv[1:] if argv is None else list(argv))
     log, heard = RunLog(sys.argv[1:] if argv is None else argv), speak_up(args.verbose, args.quiet)
     LOGGER.addHandler(log)
     progress_mode(args.quiet, args.verbose)
@@ -97,6 +97,8 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
     logging.getLogger("drake").addFilter(_serious)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     forget_warnings()
+    if alone:  # matrices are small and rollouts run side by side: further threads would only wait for each other
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
         warnings.simplefilter("ignore")
         os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
@@ -116,12 +118,12 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
         print(f"workbench {args.verb}: error: out of memory ({' '.join(str(e).split()) or 'no more is free'})", file=sys.stderr)
         return 2
     except (OSError, ValueError) as e:
-        return _refused(f"workbench {args.verb}", e)
+        return _report(f"workbench {args.verb}", e)
     finally:
         signal.signal(signal.SIGTERM, previous)
 
 
-def _parsed(parser: argparse.ArgumentParser, argv: list[str]) -> argparse.Namespace:
+def _parse(parser: argparse.ArgumentParser, argv: list[str]) -> argparse.Namespace:
     """Arguments of a verb; `help` and `help VERB` are the same as --help. Each verb reports arguments that it does not know,
     with its options."""
     if argv[:1] == ["help"]:
@@ -137,7 +139,7 @@ def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
     return dict(of.choices)
 
 
-def _refused(name: str, error: OSError | ValueError) -> int:
+def _report(name: str, error: OSError | ValueError) -> int:
     """Reports in one line an error that the user can correct; raises internal errors again."""
     problem = _readable(error)
     if problem is None:

@@ -11,6 +11,7 @@ from workbench.cli.check import check_model
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
+    from workbench.gait.optimize import OptimizeOptions
     from workbench.gait.request import Request
     from workbench.robot import RobotModel
 
@@ -22,30 +23,35 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="search for a gait that the servos can follow, as a certified table",
         description="Searches for a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
         "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv (from neutral into the "
-        "gait, the cycle, and back), certificate.json and a page. A request that cannot be met says which limit binds, and exits "
-        "with 2. A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
-    parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as possible (default: max)")
+        "gait, the cycle, and back), certificate.json and a page. If a request cannot be met, the command names the binding "
+        "limit and exits with 2. An interrupted run continues when it is called again with the same arguments.")
+    parser.add_argument("--speed", type=_parse_speed, metavar="V|max",
+                        help="at least V m/s, or as fast as possible (default: max)")
     way = parser.add_mutually_exclusive_group()
-    way.add_argument("--backward", action="store_true", help="go backwards")
-    way.add_argument("--sideways", action="store_true", help="go to the left, or with --right to the right")
-    way.add_argument("--turn", type=_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s; "
-                     "with --speed V, on the arc that takes")
+    way.add_argument("--backward", action="store_true", help="walk backwards")
+    way.add_argument("--sideways", action="store_true", help="walk to the left, or with --right to the right")
+    way.add_argument("--turn", type=_parse_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s; "
+                     "with --speed V, along an arc")
     way.add_argument("--arc", type=_positive, metavar="R", help="follow a circle of radius R m to the left")
     parser.add_argument("--right", action="store_true", help="turn, arc or sideways to the right")
-    parser.add_argument("--slope", type=_angle, default=0.0, metavar="DEG", help="go uphill, or downhill where negative")
-    parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of what "
-                        "full duty gives; ROBOTIS advises a fifth)")
+    parser.add_argument("--slope", type=_angle, default=0.0, metavar="DEG", help="slope, positive uphill (default: 0)")
+    parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of that at "
+                        "full duty; ROBOTIS recommends a fifth)")
     best = parser.add_mutually_exclusive_group()
-    best.add_argument("--least-energy", action="store_true", help="with the least electrical power, at the required speed or at "
-                      "that of the ROBOTIS walk")
+    best.add_argument("--least-energy", action="store_true", help="minimise electrical power, at the required speed or that of "
+                      "the ROBOTIS walk")
     best.add_argument("--smoothest", action="store_true", help="minimise base jerk (speed as for --least-energy)")
-    best.add_argument("--gentlest", action="store_true", help="with the least RMS torque, likewise")
-    parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all point back, as the robot has them")
-    parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the gait has to work, as YAML "
-                        "(default: the file that ships)")
+    best.add_argument("--gentlest", action="store_true", help="minimise RMS torque (speed as for --least-energy)")
+    parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all bend backward, as on the real robot")
+    parser.add_argument("--ensemble", metavar="FILE", help="YAML file of the random robot variants on which the gait must work "
+                        "(default: the bundled one)")
     parser.add_argument("--method", choices=("search", "plan", "both"), default="search", help="plan: joint paths of trajectory "
-                        "optimisation as tables, without a search; both: a search that begins at those, too (default: search)")
-    parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
+                        "optimisation as tables, without a search; both: a search that also starts from those (default: search)")
+    parser.add_argument("--start", metavar="MOTION", help="the gait.csv of another gait: the search starts there instead of from "
+                        "random gaits; its certificate is read from the same folder")
+    parser.add_argument("--map", metavar="FILE", help="map.json of a map of gaits: the search also starts from its nearest gait")
+    parser.add_argument("--effort", type=positive, default=4, metavar="N",
+                        help="search effort: 1 for a first look, more for longer (default: 4)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_model(parser)
@@ -55,14 +61,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Searches, certifies, writes, and says what came of it."""
-    from dataclasses import replace
-
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
     from workbench.gait.ensemble import load_ensemble
     from workbench.gait.machine import GaitMachine
-    from workbench.gait.optimize import MEMORY, optimize, options_of, write_gait
+    from workbench.gait.optimize import MEMORY, optimize, write_gait
     from workbench.robot.model_file import load_model_file
     from workbench.view.report.gait import write_gait_page
 
@@ -70,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
     check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
-    options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
     request = _request(args, model)
+    options = _options(args, model, request)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)
         result = optimize(machine, request, ensemble, options, progress, args.out / MEMORY, other_engine())
@@ -87,6 +91,26 @@ def run(args: argparse.Namespace) -> int:
     print(result.certified.certificate.summary())
     print(f"wrote {args.out}: open {args.out / 'report.html'}")
     return 0
+
+
+def _options(args: argparse.Namespace, model: RobotModel, request: Request) -> OptimizeOptions:
+    """Size, method and start of the search."""
+    from dataclasses import replace
+
+    from workbench.files import InputError
+    from workbench.gait.certificate import read_shape
+    from workbench.gait.gait_map import load_map
+    from workbench.gait.optimize import options_of
+
+    options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
+    if args.map is not None:
+        options = replace(options, given=(load_map(args.map, model).start_for(request),))
+    if args.start is None:
+        return options
+    if args.method == "plan":
+        raise InputError(None, "--start with --method plan: expected a method that searches")
+    return replace(options, given=(*options.given, read_shape(args.start)), planned=False,
+                   budget=replace(options.budget, seeds=0))
 
 
 def _request(args: argparse.Namespace, model: RobotModel) -> Request:
@@ -124,7 +148,7 @@ def _is_model_file(name: str) -> bool:
     return isinstance(content, dict) and {"takes", "predict"}.isdisjoint(content)
 
 
-def _speed(text: str) -> float:
+def _parse_speed(text: str) -> float:
     """A positive number or `max`, for argparse."""
     return math.inf if text == "max" else _positive(text)
 

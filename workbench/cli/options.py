@@ -21,21 +21,21 @@ def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy
     """--model: which robot; `unless` where the user names none. default: description of that default."""
     parser.add_argument(
         "--model", metavar="FILE", default=unless,
-        help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos "
-        f"and ground are taken (default: {default})")
+        help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml, whose robot, servos "
+        f"and ground are used (default: {default})")
     add_packages(parser)
 
 
 def add_cycles(parser: argparse.ArgumentParser, default: int) -> None:
     """--cycles: how often a motion's loop runs. default: where neither the option nor the file says it."""
-    parser.add_argument("--cycles", type=positive, metavar="N", help="how often the motion, or its loop between start and stop, "
-                        f"is played (default: as its file says, else {default})")
+    parser.add_argument("--cycles", type=positive, metavar="N", help="number of times to play the motion, or its loop between "
+                        f"start and stop (default: from its file, else {default})")
 
 
 def add_packages(parser: argparse.ArgumentParser) -> None:
     """--package: where package:// URIs of a model's meshes point."""
     parser.add_argument("--package", metavar="NAME=DIR", dest="packages", type=_package, action="append", default=[],
-                        help="folder of a ROS package that the model's meshes name; may be given several times")
+                        help="folder of a ROS package that the model's meshes refer to; repeatable")
 
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:

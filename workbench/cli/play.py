@@ -25,19 +25,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "play",
         help="play a motion on the robot and log its joints",
         description="Checks all servos, ramps from where the robot is to neutral, plays the motion, ramps back and releases. "
-        "Writes a joint log with the times really sent, and registers.yaml. Ctrl-C, heat, low voltage or a silent servo end it "
+        "Writes a joint log with the actual send times, and registers.yaml. Ctrl-C, heat, low voltage or a silent servo end it "
         "with a ramp to neutral; docs/robot-host.md says what else can happen.")
     parser.add_argument("motion", metavar="MOTION", nargs="?", help="pose table, FILE.mtn#page, or a bag with a JointTrajectory")
     add_bus(parser)
     add_model(parser)
     add_cycles(parser, 3)
-    parser.add_argument("--slow", type=positive, default=1, metavar="N", help="play it N times as slowly (default: 1)")
+    parser.add_argument("--slow", type=positive, default=1, metavar="N",
+                        help="slow the motion down by a factor of N (default: 1)")
     parser.add_argument("--torque", type=_percent, default=100, metavar="PERCENT",
-                        help="share of the torque limit that the servos get, from 10 (default: 100)")
+                        help="torque limit of the servos, in percent of the full one, at least 10 (default: 100)")
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
-    parser.add_argument("--bag", action="store_true", help="also write the joint log as a bag of ROS 2 (MCAP), NAME_bag")
-    parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
+    parser.add_argument("--force", action="store_true", help="play even if a limit is broken or the certificate is missing")
+    parser.add_argument("--bag", action="store_true", help="also write the joint log as a ROS 2 bag (MCAP), NAME_bag")
+    parser.add_argument("--finish", metavar="JOURNAL", help="recover the joint log from NAME.play after an interrupted run")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
 

@@ -15,21 +15,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "run",
         help="play a motion on the robot, record it, and compare it with the simulation",
-        description="Checks all servos, plays the motion while the cameras record it, and compares what came out with the "
-        "simulation; with --diagnose says which physics is missing. On an emulated robot, unless --port names a real one; never "
-        "replaces the controller's program. Writes a session: takes, joint log, registers, comparison.")
+        description="Checks all servos, plays the motion while the cameras record it, and compares the result with the "
+        "simulation; with --diagnose it also finds the missing physics. The robot is emulated unless --port names a real one. "
+        "The controller's program is never replaced. Writes a session: takes, joint log, registers, comparison.")
     parser.add_argument("motion", metavar="MOTION")
     add_bus(parser, default=VIRTUAL)
     add_model(parser)
-    parser.add_argument("--upload", action="store_true", help="have the CM-530's own program play it: --port is its PC link")
+    parser.add_argument("--upload", action="store_true", help="play from the CM-530's own program; --port is its PC link")
     parser.add_argument("--image", metavar="FILE", help="with --port virtual --upload: the program in the emulated CM-530")
     parser.add_argument("--motive", metavar="HOST",
                         help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     add_cycles(parser, 10)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the emulated cameras (default: 0)")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
-    parser.add_argument("--diagnose", action="store_true", help="search for the physics that is missing, too")
+    parser.add_argument("--force", action="store_true", help="play even if a limit is broken or the certificate is missing")
+    parser.add_argument("--diagnose", action="store_true", help="also search for missing physics")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_out(parser, default="runs/run")
     parser.set_defaults(run=run)

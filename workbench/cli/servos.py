@@ -23,12 +23,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "servos",
         help="list the servos on the bus and, with --model, every register that differs from the model",
-        description="Looks for a servo at every ID and reads all its registers. Shows each servo's state and, with --model, what "
-        "differs from the model. --out writes registers.yaml, which a session.yaml may name as evidence. Nothing moves without "
-        "--wiggle.")
+        description="Looks for a servo at every ID and reads all its registers. Shows each servo's state and, with --model, how "
+        "it differs from the model. --out writes registers.yaml, which a session.yaml may cite as evidence. Without --wiggle "
+        "nothing moves.")
     add_bus(parser)
-    add_model(parser, "none: lists what there is; for --write, --wiggle, --set-id and --out the bundled puppy", None)
-    parser.add_argument("--write", action="store_true", help="set return delay and angle limits as the model has them; read back")
+    add_model(parser, "none, which lists the servos; for --write, --wiggle, --set-id and --out the bundled puppy", None)
+    parser.add_argument("--write", action="store_true", help="set return delay and angle limits from the model, and verify them")
     parser.add_argument("--set-id", metavar="JOINT", help="give the one servo on the bus the ID of this joint")
     parser.add_argument("--wiggle", metavar="JOINT", help="move this joint, or `all` one after the other, by 3 deg and back, and "
                         "ask which one moved and which way: finds swapped IDs and signs")
@@ -85,7 +85,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _warn(surveys: Sequence[Survey]) -> int:
-    """Tells of a slow adapter and of all problems; the exit code."""
+    """Warns about a slow adapter and every problem; returns the exit code."""
     from workbench.device.bus.wire import slow_adapter
 
     slow = slow_adapter(max(found.latency for found in surveys))

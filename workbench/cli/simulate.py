@@ -20,8 +20,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser)
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
                         help="foot-ground contact model (default: point)")
-    parser.add_argument("--base", choices=("free", "fixed"), help="walking, or held level on a stand (default: as in the takes "
-                        "of the session that the model is of, else free)")
+    parser.add_argument("--base", choices=("free", "fixed"), help="free: walking; fixed: held level on a stand (default: as in "
+                        "the takes that the model was diagnosed from, else free)")
     parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
                         help="full servo law; its fast approximation; joints that follow the motion exactly")
     add_cycles(parser, 1)

@@ -14,16 +14,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "trim",
         help="straighten a gait for the robot in a recording",
-        description="Estimates from a recording of a certified gait (a metre of walking is enough) how far the robot turns "
-        "although it should not, and writes the same gait with another turn in each stance, certified again: gait.csv, "
+        description="Estimates from a recording of a certified gait (a metre of walking is enough) how much the robot "
+        "veers, and writes the same gait with a corrected turn in each stance, certified again: gait.csv, "
         "certificate.json and a page. The change follows from the recorded heading per metre, its scatter from cycle to cycle, "
         "and how the gait responds to its turn on the model. Trim the result again with the next recording.")
-    parser.add_argument("recording", metavar="RECORDING", help="of the base's rigid body, walking the gait")
+    parser.add_argument("recording", metavar="RECORDING",
+                        help="recording of the base's rigid body while the robot walks the gait")
     parser.add_argument("--gait", metavar="MOTION", required=True,
                         help="the gait.csv that was played; its certificate is read from the same folder")
-    parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the motion is certified "
-                        "(default: the file that ships)")
-    parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a short certificate; 4: the default")
+    parser.add_argument("--ensemble", metavar="FILE", help="YAML file of the random robot variants for the certificate "
+                        "(default: the bundled one)")
+    parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1 for a short certificate (default: 4)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_model(parser)
     add_out(parser, default="runs/trim")

@@ -24,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_cycles(parser, 3)
     parser.add_argument("--port", type=positive, metavar="N", help="server port (default: the first free one from 7000 on)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="stop after S seconds")
-    add_model(parser, "the bundled puppy; whose take it is")
+    add_model(parser, "the bundled puppy")
     parser.set_defaults(run=run)
 
 

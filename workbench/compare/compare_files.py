@@ -53,7 +53,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     if recording is not None:
         if kinds[1] == "recording":
             first = _by_first_motion(recording).recorded
-            takes = [first, register_take(_read(files[1], model, base), _bridged(first), None).recorded]
+            takes = [first, register_take(_read(files[1], model, base), _bridge_gaps(first), None).recorded]
         else:
             predicted = takes[1]
             assert predicted is not None
@@ -95,7 +95,7 @@ def _first_motion(take: Take, least: float = np.deg2rad(1.0)) -> float:
     return float(take.time[held[0]])
 
 
-def _bridged(take: Take) -> Take:
+def _bridge_gaps(take: Take) -> Take:
     """The take with its gaps filled straight, for something else to be laid over it."""
     q = take.q.copy()
     for column in q.T:

@@ -69,7 +69,7 @@ def compare_session(session: Session, config: SimulationConfig | None = None, *,
     compared = []
     for i, t in enumerate(registered):
         progress(f"comparing {t.spec.name}", i / len(registered))
-        compared.append(_compared(t, by_name[t.spec.name], noise))
+        compared.append(_compare(t, by_name[t.spec.name], noise))
     return Comparison(tuple(compared), unreadable + unregistered, provenance(session.model, config, time.monotonic() - began))
 
 
@@ -99,7 +99,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
     return out
 
 
-def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: Progress = no_progress, n_jobs: int = 2
+def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int = 2, progress: Progress = no_progress
                     ) -> list[Rollouts]:
     """As `roll_out`, but for the finer steps of runs of which the compiled station covers the nominal one and agrees with Drake:
     these are the compiled station's."""
@@ -174,7 +174,7 @@ def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
     return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
 
 
-def _compared(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:
+def _compare(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:
     compared = compare_takes(
         t.recorded, t.observed(rollouts.nominal), t.model, finer=[t.observed(r) for r in rollouts.finer],
         other_contact=[t.observed(r) for r in rollouts.other_contact], noise=noise)

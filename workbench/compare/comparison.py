@@ -16,7 +16,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.types import Array
 
-__all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "aligned", "compare_takes", "noise_of"]
+__all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "align", "compare_takes", "noise_of"]
 
 
 def compare_takes(
@@ -32,17 +32,17 @@ def compare_takes(
     if not np.isfinite(recorded.starts_at):
         recorded = replace(recorded, starts_at=float(recorded.time[0]))
     if simulated.zeroed and not recorded.zeroed:
-        recorded = _zeroed(recorded)
+        recorded = _zero(recorded)
     joints = tuple(j for j in recorded.joints if j in simulated.joints)
     if not joints:
         raise InputError(recorded.name, f"no joint in common with '{simulated.name}'; expected takes of one robot")
-    takes = _Takes(recorded, aligned(simulated, recorded), [aligned(t, recorded) for t in finer],
-                   [aligned(t, recorded) for t in other_contact])
+    takes = _Takes(recorded, align(simulated, recorded), [align(t, recorded) for t in finer],
+                   [align(t, recorded) for t in other_contact])
     noise = noise or noise_of([recorded])
     return TakeComparison(
         name=recorded.name, recorded=recorded, simulated=takes.simulated, joints=_joint_channels(takes, joints, noise),
         body=_body_channel(takes, noise), distance=takes.pair(lambda t: float(np.linalg.norm(_displacement(t)[:2]))),
-        forward=takes.pair(lambda t: float(_displacement(t)[0])), heading=takes.pair(_turned), speed=takes.pair(_speed),
+        forward=takes.pair(lambda t: float(_displacement(t)[0])), heading=takes.pair(_heading_change), speed=takes.pair(_speed),
         smoothness=takes.pair(_smoothness),
         joint_smoothness={j: Pair(_joint_smoothness(recorded, j), _joint_smoothness(takes.simulated, j)) for j in joints},
         recorded_phases=foot_phases(recorded, model), simulated_phases=foot_phases(takes.simulated, model),
@@ -72,20 +72,20 @@ def noise_of(takes: Sequence[Take]) -> Noise:
     return Noise(joints, float(np.linalg.norm(metrics.noise_at_rest(paths))) if paths else NAN)
 
 
-def aligned(take: Take, reference: Take) -> Take:
+def align(take: Take, reference: Take) -> Take:
     """`take` at the times of `reference`, both counted from their first commands, with zeros defined as in the reference.
 
     Without a known first command, time is counted from a take's first frame.
     """
     if reference.zeroed and not take.zeroed:
-        take = _zeroed(take)
+        take = _zero(take)
     if np.array_equal(take.time, reference.time) and take.starts_at == reference.starts_at:
         return take
     start, onto = (t.starts_at if np.isfinite(t.starts_at) else float(t.time[0]) for t in (take, reference))
     return replace(take.resampled(reference.time - onto + start), time=reference.time, starts_at=onto)
 
 
-def _zeroed(take: Take) -> Take:
+def _zero(take: Take) -> Take:
     """Zero at rest; a take without a rest, at the first angle seen."""
     take = take.zeroed_at_rest()
     if take.zeroed:
@@ -162,7 +162,7 @@ def _displacement(take: Take) -> Array:
     return metrics.travelled(take.p_WB, take.since_start)
 
 
-def _turned(take: Take) -> float:
+def _heading_change(take: Take) -> float:
     assert take.quat_WB is not None
     return metrics.turned(take.quat_WB, take.since_start)
 

@@ -11,7 +11,7 @@ import numpy as np
 from workbench.compare.options import COMPARE
 from workbench.compare.session import PredictSpec, Session
 from workbench.compare.session_takes import LeftOut, capture_yaw, read_takes
-from workbench.effects.apply import seen
+from workbench.effects.apply import apply_to_measurement
 from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.joint_log import write_joint_log
@@ -128,7 +128,7 @@ class _Captured:
         """Writes a rollout as the cameras of the start file would have seen it."""
         start = self.start
         measurement = register(start, model, take.commands, take, self.starts_at, yaw, self.spec.base)
-        _, bodies = observe(take, seen(measurement, model), model, self.time)
+        _, bodies = observe(take, apply_to_measurement(measurement, model), model, self.time)
         return write_motive(path, {asset: bodies[asset] for asset in start.rigid_bodies}, start.rate, units=start.units,
                             take_name=self.spec.name, first_frame=int(start.frames[0]), metadata=start.metadata)
 

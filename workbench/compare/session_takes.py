@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.compare.comparison import aligned
+from workbench.compare.comparison import align
 from workbench.compare.options import FILES
 from workbench.compare.session import Session, TakeSpec
-from workbench.effects.apply import seen
+from workbench.effects.apply import apply_to_measurement
 from workbench.files import InputError
 from workbench.files.errors import MistypedError
 from workbench.motion.commands import Commands
@@ -76,9 +76,9 @@ class RegisteredTake(ReadTake):
 
         model: the robot that was simulated, where its effects are not this take's: some change what cameras see."""
         if not self.recorded.zeroed:
-            return aligned(rollout.as_logged(), self.recorded)
+            return align(rollout.as_logged(), self.recorded)
         model = model or self.model
-        return observe(rollout, seen(self.measurement, model), model, self.recorded.time)[0]
+        return observe(rollout, apply_to_measurement(self.measurement, model), model, self.recorded.time)[0]
 
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:

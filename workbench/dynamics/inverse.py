@@ -20,7 +20,7 @@ from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
-from workbench.robot import GRAVITY, RobotModel
+from workbench.robot import RobotModel
 from workbench.types import Array
 
 Stance = Mapping[str, NDArray[np.bool_]]
@@ -57,17 +57,17 @@ class InverseDynamics:
 
     base: "free", feet on a level floor, or "fixed", held level (or as the SDF mounts it), or moved along a path. friction:
     of foot on ground; None: the model's ground, else the SDF's feet, else 0.5. servo_friction: whether the motor torque
-    includes the servo's own Coulomb and viscous friction. gravity [m/s²] in W. InputError for a base that the model lacks or
+    includes the servo's own Coulomb and viscous friction. InputError for a base that the model lacks or
     that cannot float.
     """
 
     def __init__(self, model: RobotModel, base: Literal["free", "fixed"] = "free", friction: float | None = None,
-                 servo_friction: bool = True, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:
+                 servo_friction: bool = True) -> None:
         if base not in ("free", "fixed"):
             raise InputError(None, f"base: expected free or fixed, got '{base}'")
         model.check_base(floating=base == "free")
         self.model, self.base, self.servo_friction = model, base, servo_friction
-        self.machine = Machine(model, gravity)
+        self.machine = Machine(model)
         self.friction = self._pair_friction(friction)
         self._servos = [model.servo(j) for j in model.joints]
 
@@ -78,20 +78,20 @@ class InverseDynamics:
         stance: foot -> (N,) bool, when feet are down; None: found from heights and speeds. floor: its height [m]; None: where the
         feet find it. InputError for a joint or foot that the model lacks.
         """
-        trajectory, problems = self._completed(trajectory)
+        trajectory, problems = self._complete(trajectory)
         solution = self._solve(trajectory, self._dearness(trajectory, stance, floor))
         N, n = trajectory.q.shape
         none = np.zeros((N, n))
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
-    def of_motion(self, motion: Motion, cycles: int | None = None, step: float = 1 / 240) -> InverseDynamicsResult:
-        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled every `step` s) on a fixed base.
+    def of_motion(self, motion: Motion, cycles: int | None = None) -> InverseDynamicsResult:
+        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
         if self.base != "fixed":
             raise InputError(motion.source, "a motion does not say how a free base moves; expected a take of it, ideal drive")
-        path = interpolate_motion(motion, motion.often(cycles), step)
+        path = interpolate_motion(motion, motion.often(cycles), 1 / 240)
         N = len(path.time)
         place, turn = np.tile(self.machine.mount[0], (N, 1)), np.tile(self.machine.mount[1], (N, 1))
         still = np.zeros((N, 6))
@@ -132,7 +132,7 @@ class InverseDynamics:
         torque_left, speed_left = np.zeros_like(q), np.zeros_like(q)
         random = np.random.default_rng(0)
         for _ in range(draws):
-            turned = _turned(quat, _normal(random, np.full(p.shape, noise.rotation)))
+            turned = _rotate(quat, _normal(random, np.full(p.shape, noise.rotation)))
             moved = p + _normal(random, np.tile(noise.p, (len(take), 1)))
             noisy = smoothed(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
             other = self._solve(noisy, dear)
@@ -141,7 +141,7 @@ class InverseDynamics:
             for sum_, here, there in zip((torque_left, speed_left), margins, self._margins(other, noisy)):
                 sum_ += (there - here) ** 2 / draws
         pool = max(1, round(window / float(np.median(np.diff(take.time))))) if len(take) > 1 else 1
-        spreads = _Spreads(*(_pooled(variance, pool) for variance in (torque, residual, torque_left, speed_left)))
+        spreads = _Spreads(*(_pool(variance, pool) for variance in (torque, residual, torque_left, speed_left)))
         return self._result(take.name, trajectory, solution, spreads, problems)
 
     # ---- the equations -----------------------------------------------------------------------------------------------------
@@ -204,7 +204,7 @@ class InverseDynamics:
 
     # ---- what a take holds -------------------------------------------------------------------------------------------------
 
-    def _completed(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
+    def _complete(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
         """All joints in the model's order; those that the trajectory lacks at zero."""
         self._check_joints("trajectory", trajectory.joints)
         missing = [j for j in self.model.joints if j not in trajectory.joints]
@@ -273,12 +273,12 @@ def _normal(random: np.random.Generator, sigma: Array) -> Array:
     return np.asarray(random.standard_normal(sigma.shape) * np.nan_to_num(sigma))
 
 
-def _turned(quat: Array, rotation: Array) -> Array:
+def _rotate(quat: Array, rotation: Array) -> Array:
     """Quaternions wxyz (N, 4) turned by small rotation vectors (N, 3) [rad] in W."""
     return quat + quaternions.multiply(np.hstack([np.zeros((len(rotation), 1)), rotation / 2]), quat)
 
 
-def _pooled(variance: Array, samples: int) -> Array:
+def _pool(variance: Array, samples: int) -> Array:
     """Standard deviation from the mean variance of neighbouring samples; NaN where there is none."""
     seen = np.asarray(np.isfinite(variance).all(axis=1))
     count = uniform_filter1d(seen.astype(float), samples)

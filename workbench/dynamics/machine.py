@@ -50,7 +50,7 @@ class Machine:
     Of a model's effects those that change masses are included; left_out names the others.
     """
 
-    def __init__(self, model: RobotModel, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:
+    def __init__(self, model: RobotModel) -> None:
         self.model, self.joints = model, model.joints
         model.check_base(floating=False)
         kinematics = model.kinematics
@@ -75,9 +75,9 @@ class Machine:
             joint.set_default_damping_vector(np.zeros(joint.num_velocities()))
         for index in plant.GetJointActuatorIndices():
             plant.get_mutable_joint_actuator(index).set_default_rotor_inertia(0.0)
-        plant.mutable_gravity_field().set_gravity_vector(list(gravity))
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
         plant.Finalize()
-        self.gravity = np.array(gravity)
+        self.gravity = np.array([0.0, 0.0, -GRAVITY])
         self._context: Any = plant.CreateDefaultContext()
         self._forces = MultibodyForces(plant)
         body = plant.GetBodyByName(model.base)

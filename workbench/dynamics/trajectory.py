@@ -40,14 +40,14 @@ class RobotTrajectory:
             raise InputError(None, "trajectory, time: expected finite times that increase")
 
     @staticmethod
-    def at_rest(joints: tuple[str, ...], q: Array, p_WB: Array | None = None, quat_WB: Array | None = None) -> RobotTrajectory:
-        """N poses that are held, a second apart: q (N, n) [rad]; base at the origin and level if not given."""
+    def at_rest(joints: tuple[str, ...], q: Array, p_WB: Array | None = None) -> RobotTrajectory:
+        """N poses that are held, a second apart: q (N, n) [rad]; base level, at the origin if not given."""
         q = np.atleast_2d(np.asarray(q, dtype=float))
         N = len(q)
         return RobotTrajectory(
             np.arange(float(N)), joints, q, np.zeros_like(q), np.zeros_like(q),
             np.zeros((N, 3)) if p_WB is None else np.broadcast_to(p_WB, (N, 3)).astype(float),
-            np.tile([1.0, 0, 0, 0], (N, 1)) if quat_WB is None else np.broadcast_to(quat_WB, (N, 4)).astype(float),
+            np.tile([1.0, 0, 0, 0], (N, 1)),
             np.zeros((N, 6)), np.zeros((N, 6)))
 
 

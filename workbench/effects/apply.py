@@ -101,7 +101,7 @@ def physics_of(model: RobotModel) -> Physics:
         retimed |= type(effect).commands is not Effect.commands
         if type(effect).description is not Effect.description:
             changes.append((effect, spec))
-    sdf = _changed(model, changes) if changes else None
+    sdf = _apply_to_sdf(model, changes) if changes else None
     return Physics(sdf, law, ground, friction, stiffness, gravity, tether, zero,
                    sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends,
                    tuple(terms), retimed)
@@ -110,7 +110,7 @@ def physics_of(model: RobotModel) -> Physics:
 _builds: OrderedDict[Any, SdfRobot] = OrderedDict()
 
 
-def _changed(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
+def _apply_to_sdf(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
     """The model's SDF with these effects on its description; the same object for the same ones, as most robots of a search differ
     in their servos alone. Another package's effect may look at all of the model, so that nothing is shared with it."""
     own = all(type(effect).__module__.startswith(f"{__package__}.") for effect, _ in changes)
@@ -132,17 +132,18 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
     return np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=np.int64)
 
 
-def played(commands: Commands, model: RobotModel) -> Commands:
-    """The commands on which the servos act: those sent, delayed as in the nominal law, and changed by effects."""
+def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
+    """The commands on which the servos act: those sent, goals delayed as in the nominal law, and changed by effects. A servo that
+    delays its goals still lets go at once: the duty register of an STS3215 is zero in the row that switches it off."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
-        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)
+        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
     for effect, spec, values in resolved(model):
         commands = effect.commands(commands, spec.where, values, model)
     return commands
 
 
-def seen(measurement: Measurement, model: RobotModel) -> Measurement:
+def apply_to_measurement(measurement: Measurement, model: RobotModel) -> Measurement:
     """How the cameras look at a robot with these effects."""
     for effect, spec, _ in resolved(model):
         measurement = effect.measurement(measurement, spec)

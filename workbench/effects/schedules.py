@@ -26,18 +26,20 @@ def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Com
     return replace(commands, goals=goals, speeds=speeds)
 
 
-def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands:
+def delayed(commands: Commands, columns: Iterable[int], late: float, switched: bool = True) -> Commands:
     """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last. Until the first one
-    it is in neutral, or, where commands had begun before, at the first one's goal."""
+    it is in neutral, or, where commands had begun before, at the first one's goal. switched: whether the servo is switched on and
+    off so much later as well."""
     columns = list(columns)
     if not late:
         return commands
-    if len(columns) == len(commands.joints):
+    switched |= bool((commands.enabled[:, columns] == commands.enabled[:1, columns]).all())
+    if len(columns) == len(commands.joints) and switched:
         later = replace(commands, times=commands.times + late, end=commands.end + late)
         return _since(later, commands.times[0]) if commands.begun and late > 0 else later
     own = [commands.goals[:, columns], commands.speeds[:, columns], commands.enabled[:, columns]]
     changes = np.zeros(len(commands.times), dtype=bool)  # else instants double with each joint
-    for values, neutral in zip(own, (0.0, 0.0, True)):
+    for values, neutral in zip(own if switched else own[:2], (0.0, 0.0, True)):
         earlier = values[:1] if commands.begun else np.full_like(values[:1], neutral)
         changes |= (values != np.vstack([earlier, values[:-1]])).any(axis=1)
     changes[:1] |= late < 0
@@ -53,8 +55,9 @@ def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands
         out[:, columns] = np.where(neutral_before, neutral, rows[shifted][:, columns])
         return out
 
+    enabled = held(commands.enabled, True) if switched else np.where(neutral_now, True, commands.enabled[first])
     return Commands(times, commands.joints, held(commands.goals, 0.0), held(commands.speeds, 0.0),
-                    held(commands.enabled, True).astype(bool), commands.end + late, commands.poses[first],
+                    enabled.astype(bool), commands.end + late, commands.poses[first],
                     commands.begun)
 
 

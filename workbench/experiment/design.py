@@ -20,7 +20,7 @@ from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, long_runs
 from workbench.experiment.options import EXPERIMENT
-from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, reshown, seen, shown
+from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, project, reshown, show
 from workbench.experiment.rivals import Pair
 from workbench.experiment.runs import Runs, spans
 from workbench.experiment.segment import Segment
@@ -135,12 +135,12 @@ class _Bench:
         for i, pair in enumerate(pairs):
             library = self._library(pair)
             pieces |= {s.name: s for s in library}
-            tried.append(self._tried(pair, library, f"trying motions, {i + 1} of {len(pairs)}"))
+            tried.append(self._try_pieces(pair, library, f"trying motions, {i + 1} of {len(pairs)}"))
         chosen = [pieces[name] for name in _chosen(pieces, tried)]
         if not chosen:
             still = Segment("rest", self.base, np.array([0.0, 1.0]), np.zeros((2, len(self.nominal.joints))))
             return Experiment(self.runs.motion([still]), self.base, tuple(Separation(p.names, "", 0.0, 0.0) for p in pairs))
-        separations = tuple(self._proved(p, chosen, shows) for p, shows in zip(pairs, tried))
+        separations = tuple(self._verify(p, chosen, shows) for p, shows in zip(pairs, tried))
         return Experiment(self.runs.motion(chosen), self.base, separations)
 
     def _library(self, pair: Pair) -> list[Segment]:
@@ -151,22 +151,22 @@ class _Bench:
         lasting = any(not e.where for e in pair.effects)
         return pieces + (long_runs(self.nominal, self.reach, focus, EXPERIMENT.longest) if lasting else [])
 
-    def _tried(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, Shown]:
+    def _try_pieces(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, Shown]:
         """What pieces show of a pair, by name: both on all of them, their neighbours on those where they differ most."""
-        takes = self.runs.played(pair.models, [[s] for s in library], what)
-        rough = {s.name: (s, of, shown(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
+        takes = self.runs.play_all(pair.models, [[s] for s in library], what)
+        rough = {s.name: (s, of, show(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
         best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:EXPERIMENT.kept]
         if not best:
             return {}
         kept = [[s] for s, *_ in best]
-        beside = self.runs.played(pair.neighbours, kept, what) if pair.neighbours else [[] for _ in kept]
+        beside = self.runs.play_all(pair.neighbours, kept, what) if pair.neighbours else [[] for _ in kept]
         finer: list[Take | None] = [None for _ in kept]
         if self.base == "free":  # a robot on its feet multiplies small errors; one on a stand hardly does
-            finer = [fine for fine, in self.runs.played(pair.models[:1], kept, what, EXPERIMENT.time_step / 2)]
-        return {s.name: shown(pair, [*of, *more], self.sight, fine)
+            finer = [fine for fine, in self.runs.play_all(pair.models[:1], kept, what, EXPERIMENT.time_step / 2)]
+        return {s.name: show(pair, [*of, *more], self.sight, fine)
                 for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}
 
-    def _proved(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, Shown]) -> Separation:
+    def _verify(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, Shown]) -> Separation:
         """Residual difference of two rivals on the whole motion, each fitted to the other by rollouts."""
         named = [s.name for s in chosen if s.name in tried]
         if not named:
@@ -175,9 +175,9 @@ class _Bench:
 
         def play(models: Sequence[RobotModel]) -> list[Array]:
             said = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
-            return [seen(take, self.sight)[frames].ravel() for take in self.runs.played(models, [chosen], said)[0]]
+            return [project(take, self.sight)[frames].ravel() for take in self.runs.play_all(models, [chosen], said)[0]]
 
-        known = Shown.joined([tried[name] for name in named])
+        known = Shown.join([tried[name] for name in named])
         a, b = play(pair.models)
         known = reshown(reshown(known, a, "a"), b, "b")
         nearest = min(fitted_to_each_other(pair, known, play), key=lambda c: c.cost)
@@ -191,7 +191,7 @@ def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]])
 
     def value(names: Sequence[str]) -> float:
         shows = [[of[name] for name in names if name in of] for of in tried]
-        return sum(math.log1p(Shown.joined(s).chi_squared() / 2) for s in shows if s)
+        return sum(math.log1p(Shown.join(s).chi_squared() / 2) for s in shows if s)
 
     def fits(names: Sequence[str]) -> bool:
         alone = any(pieces[name].long for name in names)

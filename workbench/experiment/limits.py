@@ -25,7 +25,7 @@ class Reach:
 
     def __init__(self, model: RobotModel) -> None:
         self.model, self.units = model, units_of(model, model.joints)
-        self.speeds = np.array([_reached(model, j) for j in model.joints])
+        self.speeds = np.array([_reachable_speed(model, j) for j in model.joints])
 
     def within(self, joint: str, angle: float, room: float = 0.0) -> float:
         """The angle, cut to the joint's range less a margin and `room` [rad]."""
@@ -52,7 +52,7 @@ class Reach:
         return bool((angles > ends[:, 0] - table.count).all() and (angles < ends[:, 1] + table.count).all()
                     and (asked <= self.speeds * 1.001).all())
 
-    def cleared(self, segment: Segment) -> Segment | None:
+    def scaled_clear(self, segment: Segment) -> Segment | None:
         """The segment, its angles made smaller until links stay clear of each other; None where that takes too much."""
         for share in (1.0, 0.8, 0.6, 0.4):
             smaller = replace(segment, angles=segment.angles * share)
@@ -104,7 +104,7 @@ def _distance(a: Array, b: Array) -> Array:
     return np.asarray(np.linalg.norm(a[:, :, None] - b[:, None], axis=-1).min(axis=(1, 2)))
 
 
-def _reached(model: RobotModel, joint: str) -> float:
+def _reachable_speed(model: RobotModel, joint: str) -> float:
     servo = model.servo(joint)
     return EXPERIMENT.speed_share * min(float(servo.line.reachable_speed), _register_limit(servo.model))
 

@@ -62,7 +62,7 @@ class JointMoves:
     def segments(self) -> list[Segment]:
         """All of them, made smaller where links would come too near each other; those that stay too near are left out."""
         named = (replace(s, name=f"{' '.join(self.focus)}: {s.name}") for s in self._all())
-        return [s for s in map(self.reach.cleared, named) if s is not None]
+        return [s for s in map(self.reach.scaled_clear, named) if s is not None]
 
     def _all(self) -> Iterator[Segment]:
         yield self._sweep(30, 1.4 * EXPERIMENT.slow)
@@ -181,7 +181,7 @@ def long_runs(model: RobotModel, reach: Reach, focus: Sequence[str], seconds: fl
         for size in (20, -20):
             path.to({j: reach.within(j, math.radians(size)) for j in focus}, least=0.9)
     uneven = path.home(EXPERIMENT.slow).segment("uneven dwells", long=True)
-    return [s for s in map(reach.cleared, (work, uneven)) if s is not None]
+    return [s for s in map(reach.scaled_clear, (work, uneven)) if s is not None]
 
 
 def gravity_torque(model: RobotModel, joint: str, q: Array) -> Array:

@@ -42,7 +42,7 @@ class Shown:
     counts: Array
 
     @staticmethod
-    def joined(parts: Sequence[Shown]) -> Shown:
+    def join(parts: Sequence[Shown]) -> Shown:
         """Of takes that follow each other."""
         return Shown(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(Shown)))
 
@@ -83,7 +83,7 @@ def channels(sight: ObservationModel, base: str) -> tuple[str, ...]:
     return (*sight.sigma, *(BODY if base == "free" and sight.captured else ()))
 
 
-def seen(take: Take, sight: ObservationModel) -> Array:
+def project(take: Take, sight: ObservationModel) -> Array:
     """Channels (N, c) of a simulated take over their sigma, rests left out."""
     take = take.zeroed_at_rest() if sight.captured else take.as_logged()
     q = take.q[:, [take.column(j) for j in sight.sigma]] / np.array(list(sight.sigma.values()))
@@ -92,10 +92,10 @@ def seen(take: Take, sight: ObservationModel) -> Array:
     return np.asarray(np.nan_to_num(q[~take.resting]))
 
 
-def shown(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> Shown:
+def show(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> Shown:
     """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
-    a, b, *others = (seen(t, sight) for t in takes)
-    floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(seen(finer, sight) - a), axis=0))
+    a, b, *others = (project(t, sight) for t in takes)
+    floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(project(finer, sight) - a), axis=0))
     n, c = a.shape
     p = len(pair.a.steps())
     counts = _counts(sight, c)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from workbench.experiment.limits import Reach
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.projection import ObservationModel
-from workbench.experiment.segment import Segment, joined
+from workbench.experiment.segment import Segment, join
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -29,10 +29,10 @@ class Runs:
 
     def motion(self, segments: Sequence[Segment]) -> Motion:
         """Segments as one motion."""
-        whole = joined(segments)
+        whole = join(segments)
         return Motion(whole.name, whole.times, self.reach.model.joints, whole.angles, "next experiment", units=self.reach.units)
 
-    def played(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
+    def play_all(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
                time_step: float = EXPERIMENT.time_step) -> list[list[Take]]:
         """For each motion, given as its segments, the takes of every model. A model's jobs are consecutive, so that its station
         is reused. Frames are at the same times within a segment whether it is rolled out alone or among others."""

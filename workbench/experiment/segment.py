@@ -29,7 +29,7 @@ class Segment:
         return float(self.times[-1])
 
 
-def joined(segments: Sequence[Segment]) -> Segment:
+def join(segments: Sequence[Segment]) -> Segment:
     """One after the other."""
     times, angles, at = [segments[0].times], [segments[0].angles], segments[0].duration
     for s in segments[1:]:

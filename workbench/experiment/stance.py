@@ -31,7 +31,7 @@ class BodyMoves:
         """All that its legs can do."""
         if not self._legs:
             return []
-        return [s for s in map(self.reach.cleared, self._all()) if s is not None]
+        return [s for s in map(self.reach.scaled_clear, self._all()) if s is not None]
 
     def _all(self) -> Iterator[Segment]:
         low, calm, brisk = -0.15, EXPERIMENT.calm, EXPERIMENT.brisk
@@ -86,7 +86,7 @@ class BodyMoves:
                 first = np.zeros(len(joints))
                 # knees bend backwards: the shank's joint goes back of the line from hip to foot
                 first[-2:] = bend * np.array([0.4, 0.8 * self._opposed(foot, joints)])
-                tries.append(least_squares(partial(self._missed, foot, joints, goal),
+                tries.append(least_squares(partial(self._goal_error, foot, joints, goal),
                                            np.clip(first, ends[:, 0] + 1e-3, ends[:, 1] - 1e-3), bounds=(ends[:, 0], ends[:, 1])))
             good = [t.x for t in tries if np.linalg.norm(t.fun) < EXPERIMENT.missed * length]
             if not good:
@@ -102,7 +102,7 @@ class BodyMoves:
         hip, knee = (poses[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent for j in joints[-2:])
         return -1.0 if float(hip @ knee) > 0 else 1.0
 
-    def _missed(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:
+    def _goal_error(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:
         """From its goal to the foot (3,) [m]."""
         return self._foot(foot, joints, x) - goal
 

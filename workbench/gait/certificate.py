@@ -15,6 +15,7 @@ from workbench.files.reading import read_text
 from workbench.gait.evaluate import table_sha256
 from workbench.gait.limits import Margin
 from workbench.gait.record import Nominal, Steadiness, Ways, from_plain, to_plain
+from workbench.gait.shape import GaitShape
 from workbench.motion import Motion, PoseTable
 from workbench.robot import RobotModel
 
@@ -134,6 +135,17 @@ def read_certificate(path: str | Path) -> Certificate:
     if not good:
         raise InputError(path, "the certificate was changed after it was written")
     return Certificate(margins=margins, **kept)
+
+
+def read_shape(motion: str | Path) -> GaitShape:
+    """The shape in the certificate of a motion file, which lies in the same folder, kept or not. InputError where there is no
+    certificate, or no shape in it."""
+    at = Path(motion).parent / NAME
+    certificate = read_certificate(at)
+    try:
+        return GaitShape.from_plain(certificate.shape)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(at, "expected a gait's shape, as `workbench optimize` writes it; make the gait again") from None
 
 
 def has_mark(path: str | Path) -> bool:

@@ -20,6 +20,8 @@ from workbench.robot import RobotModel
 
 SHARE = 0.9
 """Of the robots that must keep each limit: of 64 drawn robots six may break one, which bounds the true share at 18 % (95 %)."""
+CHANCE = 0.3
+"""Largest probability with which a screening may refuse a gait that nine of ten robots keep."""
 OVER_DRAWS = " over draws"
 """Ends the name of a limit that is judged on draws."""
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
@@ -27,10 +29,10 @@ FEWEST = 20
 """Draws from which a 5th percentile says more than the smallest value: of fewer, less than one robot is below it."""
 
 
-def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMeasure]) -> list[Margin]:
+def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMeasure], screen: bool = False) -> list[Margin]:
     """Limits of the run as the robot sees them that nine in ten do better than: tilt, RMS torque, torque-speed line, foot
     clearance, slip, and contact of anything but feet. Robots that fell are counted elsewhere and left out here; none where all
-    fell, or none were drawn."""
+    fell, or none were drawn. screen: whether only what contradicts nine in ten counts, and not what chance may do to a few."""
     standing = [m for m in draws if not m.fell]
     if not standing:
         return []
@@ -58,9 +60,10 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
     judges: list[Callable[[GaitMeasure], Margin]] = [tilt, torque, line, slip]
     if all(np.isfinite(m.clearance) for m in standing):
         judges.append(clearance)
-    out = [_ninth([judge(m) for m in standing]) for judge in judges]
+    needed = screened_count(len(standing)) if screen else _required_count(len(standing))
+    out = [_ninth([judge(m) for m in standing], needed) for judge in judges]
     touched = sum(m.touched for m in standing)
-    allowed_count = len(standing) - _required_count(len(standing))
+    allowed_count = len(standing) - needed
     use = touched / max(allowed_count, 1) if touched <= allowed_count else 1.0 + touched / len(standing)
     out.append(Margin("other contact" + OVER_DRAWS, f"of {len(standing)} robots", float(touched), float(allowed_count),
                       "robots whose links touch", use))
@@ -95,9 +98,16 @@ def _required_count(count: int) -> int:
     return math.ceil(SHARE * count - 1e-9)
 
 
-def _ninth(margins: list[Margin]) -> Margin:
-    """The worst margin among the best nine tenths."""
-    needed = _required_count(len(margins))
+def screened_count(count: int) -> int:
+    """How many of a few robots have to keep a limit so that nine of ten still may: of eight 7, of 24 21. A gait that nine of ten
+    keep does worse with a probability of less than CHANCE."""
+    from scipy.stats import binom
+
+    return int(binom.ppf(CHANCE, count, SHARE))
+
+
+def _ninth(margins: list[Margin], needed: int) -> Margin:
+    """The worst margin among the best `needed`."""
     m = sorted(margins, key=lambda m: m.use)[needed - 1]
     where = f"{needed} of {len(margins)} robots"
     return replace(m, name=m.name + OVER_DRAWS, where=where if m.where == "robot" else f"{m.where}, {where}")

@@ -48,12 +48,26 @@ class Ensemble:
     posterior: Posterior | None = None
     source: str = "ensemble"
 
-    def draws(self, model: RobotModel, count: int, seed: int, folder: Path) -> list[RobotModel]:
-        """`count` robots, the same for the same seed. Robots whose links' masses differ are written into `folder` as SDF files of
-        their own; parameters of a diagnosed model's effects are drawn from its posterior, the rest is added to it."""
+    def draws(self, model: RobotModel, count: int, seed: int, folder: Path, even: bool = False) -> list[RobotModel]:
+        """`count` robots, the same for the same seed. Robots whose links' masses differ are written into `folder` as SDF
+        files of their own; parameters of a diagnosed model's effects are drawn from its posterior, the rest is added to it.
+        even: whether floor and supply are spread evenly over their ranges, one robot in each of `count` equal parts (a Latin
+        hypercube), so that a few robots show both ends; such draws are not independent, so that counts of them have no
+        confidence bound."""
         rng = np.random.default_rng([seed, 20])
         legs = sorted({j for leg in legs_of(model) for j in leg.joints}) if count else []
-        return [self._draw(model, legs, rng, folder) for _ in range(count)]
+        spread: list[dict[str, float]] = self._spread(count, seed) if even else [{} for _ in range(count)]
+        return [self._draw(model, legs, rng, folder, values) for values in spread]
+
+    def _spread(self, count: int, seed: int) -> list[dict[str, float]]:
+        """For each of `count` robots the value of every range that is the same for all its servos."""
+        rng = np.random.default_rng([seed, 21])
+        out: list[dict[str, float]] = [{} for _ in range(count)]
+        for key, (low, high) in self.ranges.items():
+            if key not in EACH_SERVO:
+                for values, place in zip(out, (rng.permutation(count) + rng.uniform(size=count)) / max(count, 1)):
+                    values[key] = float(low + (high - low) * place)
+        return out
 
     @property
     def sha256(self) -> str:
@@ -64,7 +78,9 @@ class Ensemble:
                      np.asarray(self.posterior.covariance).tolist()]
         return hashlib.sha256(repr(said).encode()).hexdigest()
 
-    def _draw(self, model: RobotModel, legs: list[str], rng: np.random.Generator, folder: Path) -> RobotModel:
+    def _draw(self, model: RobotModel, legs: list[str], rng: np.random.Generator, folder: Path,
+              values: Mapping[str, float]) -> RobotModel:
+        """values: of ranges, instead of random ones."""
         drawn = model if self.posterior is None else _from_posterior(model, self.posterior, rng)
         effects: list[EffectSpec] = []
         for key, (low, high) in self.ranges.items():
@@ -73,7 +89,8 @@ class Ensemble:
                 joints = legs if key == "backlash" else list(model.joints)
                 effects += [EffectSpec(name, (j,), {parameter: float(rng.uniform(low, high))}) for j in joints]
             else:
-                effects.append(EffectSpec(name, (), {parameter: float(rng.uniform(low, high))}))
+                value = float(rng.uniform(low, high))  # drawn in any case: the robot's other numbers stay the same
+                effects.append(EffectSpec(name, (), {parameter: values.get(key, value)}))
         if self.zero_sd:
             effects += [EffectSpec("zero_offset", (j,), {"angle": float(self.zero_sd * rng.standard_normal())}) for j in legs]
         if self.payload:

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from workbench.gait.draws import draw_margins
 from workbench.gait.evaluate import SEARCH, Candidate, Evaluator
 from workbench.gait.examine import CertifyOptions
+from workbench.gait.limits import Margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import FALLS
@@ -20,8 +22,8 @@ from workbench.types import Progress
 @dataclass(frozen=True)
 class Screening:
     """How finalists are tried before one is certified. rounds: on so many fresh robots in all, one round after the other; a
-    gait that breaks a limit in one meets no more. certified: how many gaits may be certified at most, which takes as long as a
-    small search. Fresh robots are neither the search's nor the certificate's."""
+    gait that breaks a limit in one meets no more, where a few robots may break one by chance. certified: how many gaits may be
+    certified at most, which takes as long as a small search. Fresh robots are neither the search's nor the certificate's."""
 
     rounds: tuple[int, ...] = (8, 24)
     certified: int = 3
@@ -43,8 +45,15 @@ def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Seque
                 break
             progress(f"finalist {k + 1} of {len(candidates)}: on {count} fresh robots", None)
             (drawn,) = others.judged([walked.shape], count, list)
-            walked = _with_draws(walked, drawn)
+            lenient = draw_margins(machine, request, drawn.draws, screen=True)
+            walked = _with_draws(walked, replace(drawn, margins=replaced(drawn.margins, lenient)))
         yield walked
+
+
+def replaced(margins: Sequence[Margin], others: Sequence[Margin]) -> tuple[Margin, ...]:
+    """Margins of which those with the names of others make way for them."""
+    names = {m.name for m in others}
+    return (*(m for m in margins if m.name not in names), *others)
 
 
 def _with_draws(nominal: Candidate, drawn: Candidate) -> Candidate:

@@ -16,7 +16,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.files.option_checks import check_positive, check_whole
-from workbench.files.reading import write_whole
+from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.limits import GaitLimits, table_margins, violation
@@ -108,12 +108,41 @@ class GaitMap:
             raise InputError(None, "the map has no gait that fresh robots reproduce")
         return min(known, key=lambda c: math.hypot((c.speed - speed) / o.speed, (c.turning - turning) / (2 * o.turning)))
 
+    def start_for(self, request: Request) -> GaitShape:
+        """The gait of the cell nearest to a request to walk forward, on an arc or in place, from which a search may start.
+        InputError for backward and sideways, which the map does not hold."""
+        if request.way in ("backward", "sideways"):
+            raise InputError(None, f"the map holds no gaits that go {request.way}")
+        wanted = math.inf if request.speed is None else request.speed
+        if request.way == "turn":
+            return self.nearest(0.0, request.side * min(wanted, self.options.turning)).shape
+        speed = min(wanted, self.options.speed)
+        return self.nearest(speed, request.side * speed / request.radius if request.radius else 0.0).shape
+
     def save(self, path: Path) -> Path:
         """Writes it as JSON."""
         content: dict[str, Any] = {"format": 1, "claim": CLAIM, **asdict(self), "filled": self.filled,
                                    "reproduced": self.reproduced}
         write_whole(path, json.dumps(content, indent=1) + "\n")
         return path
+
+
+def load_map(path: str | Path, model: RobotModel) -> GaitMap:
+    """A map that `GaitMap.save` wrote. InputError where it is none, or of another robot."""
+    try:
+        content = json.loads(read_text(Path(path)))
+        cells = [{**c, "shape": GaitShape.from_plain(c["shape"]), "fresh": tuple(c["fresh"]) if c["fresh"] else None}
+                 for c in content["cells"]]
+        options = {**content["options"], "knees": tuple(content["options"]["knees"])}
+        found = GaitMap(MapOptions(**options), tuple(Cell(**c) for c in cells), content["rollouts"], content["model_sha256"])
+        good = content["format"] == 1
+    except (ValueError, KeyError, TypeError, AttributeError) as e:
+        raise InputError(path, f"not a map of gaits ({type(e).__name__}: {e})") from None
+    if not good:
+        raise InputError(path, f"format: expected 1, got {content['format']}")
+    if found.model_sha256 != model.sha256:
+        raise InputError(path, f"it was made for another robot ({found.model_sha256[:12]}) than this ({model.sha256[:12]})")
+    return found
 
 
 def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0, options: MapOptions | None = None,

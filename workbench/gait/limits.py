@@ -166,10 +166,10 @@ def violation(margins: Iterable[Margin]) -> float:
     return sum(math.log(min(m.use, 1e3)) for m in margins if m.use > 1.0 and not m.advice)
 
 
-def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False,
-        kind: Kind = "run") -> Margin:
+def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False
+        ) -> Margin:
     share = use if use is not None else value / limit if limit > 0 else np.inf
-    return Margin(name, where, float(value), float(limit), unit, float(share), advice, kind)
+    return Margin(name, where, float(value), float(limit), unit, float(share), advice)
 
 
 def least(name: str, where: str, value: float, limit: float, unit: str, kind: Kind = "run") -> Margin:

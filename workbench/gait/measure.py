@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from workbench.effects.apply import law_of, played
+from workbench.effects.apply import apply_to_commands, law_of
 from workbench.gait.cycles import cycles_of, scatter_of
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -69,11 +69,6 @@ class GaitMeasure:
     def speed(self) -> float:
         """Forward [m/s]."""
         return self.velocity[0]
-
-    @property
-    def drift_per_metre(self) -> float:
-        """Change of heading by distance [rad/m]; of less than a centimetre as of one."""
-        return self.drift / max(self.gone, 0.01)
 
 
 def fallen(joints: int) -> GaitMeasure:
@@ -148,7 +143,7 @@ def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
     if take.commands is None:
         duty = law.duty(-q)
     else:
-        duty = law.duty(played(take.commands.reordered(take.joints), model).reference(take.time) - q)
+        duty = law.duty(apply_to_commands(take.commands.reordered(take.joints), model).reference(take.time) - q)
     motor = duty * law.full_torque - law.back_emf * servo_rates(take)
     ampere = np.array([model.servo(j).stall_torque for j in model.joints]) / STALL_CURRENT
     voltage = law.full_torque / law.torque_per_volt

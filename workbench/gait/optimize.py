@@ -117,12 +117,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
-        before, found = found.best, refined(evaluator, found, options.refine, progress)
-        plans = plans.with_refined(before.shape, found.best.shape)
+        before, found = found, refined(evaluator, found, options.refine, progress)
+        plans = plans.with_refined(before, found)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
             "ensemble": Path(ensemble.source).name, "ensemble_sha256": ensemble.sha256, "method": options.method,
-            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before,
+            "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before.best,
             "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
@@ -142,11 +142,13 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
                           progress)
         for k, walked in enumerate(tried):
             if not walked.good:
+                progress(f"finalist {k + 1} is refused: {binding(walked.margins)}", None)
                 refused.append(walked)
                 continue
             certified.append(examine(walked, options.certify, k + 1))
             if certified[-1][1].certificate.kept:
                 return finished(True, "", *certified[-1], replace(found, best=walked))
+            progress(f"finalist {k + 1} is not certified: {binding(certified[-1][1].certificate.margins)}", None)
             if len(certified) == options.screening.certified:
                 break
         if certified:
@@ -180,8 +182,8 @@ class _Draws:
     folder: Path
 
     def searched(self) -> list[RobotModel]:
-        """Those of the search."""
-        return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder)
+        """Those of the search, floor and supply spread evenly."""
+        return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder, even=True)
 
     def screening(self) -> list[RobotModel]:
         """Those of the finalists."""
@@ -220,6 +222,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     said = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
+    progress(f"{said}; looking for the nearest that works", None)  # before the search, which takes half a minute
     look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)

@@ -26,10 +26,11 @@ class Plans:
     shapes: tuple[GaitShape, ...] = ()
     asked: int = 0
 
-    def with_refined(self, before: GaitShape, after: GaitShape) -> Plans:
-        """With the programme behind one shape also behind another that was refined from it."""
-        planned = self.of(before)
-        return self if planned is None else replace(self, solved={**self.solved, after.offsets: planned})
+    def with_refined(self, before: Found, after: Found) -> Plans:
+        """With the programme behind the best gait of a search also behind those that were refined from it."""
+        planned, known = self.of(before.best.shape), {before.best.shape, *(c.shape for c in before.others)}
+        new = [c.shape.offsets for c in (after.best, *after.others) if c.shape not in known]
+        return self if planned is None else replace(self, solved={**self.solved, **dict.fromkeys(new, planned)})
 
     def of(self, shape: GaitShape) -> Planned | None:
         """The programme behind a shape; None of one that was not planned."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files.option_checks import check_positive, check_whole
-from workbench.gait.evaluate import Evaluator
+from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import allowed_rms
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
@@ -32,14 +32,20 @@ ENOUGH = 1.7
 """Foot clearance by its limit, from which more is not better: draws vary by a third."""
 
 
+KEPT = 2
+"""How many refined gaits become finalists at most."""
+
+
 @dataclass(frozen=True)
 class RefineOptions:
     """Size of the refinement. InputError for a number out of range.
 
-    iterations: Gauss-Newton steps; 0: none. robots: of the ensemble, in addition to the nominal one. harmonics: of the cycle in
-    each joint's change, in addition to its mean. probe: change of a harmonic by which its effect is measured [rad]. target: speed
-    that is aimed at, by the nominal robot's. speed, heading [by rad/m], slip, clearance, torque: weights of the residuals: speed
-    is relative to the nominal robot's; slip and torque count from `near` of their limits on, clearance below ENOUGH of its own.
+    iterations: Gauss-Newton steps; 0: none. robots: of the ensemble, in addition to the nominal one. harmonics: of the cycle
+    in each joint's change, in addition to its mean. probe: change of a harmonic by which its effect is measured [rad]. target:
+    speed that is aimed at, by the nominal robot's. speed, heading [by rad/m], slip, clearance, torque: weights of the
+    residuals: speed is relative to the nominal robot's; slip and torque count from `near` of their limits on, clearance below
+    ENOUGH of its own. cautions: factors of the weights of slip, clearance and torque, one after the other until a gait keeps
+    the limits on all robots; parts: of the change that are tried on them.
     """
 
     iterations: int = 1
@@ -53,6 +59,8 @@ class RefineOptions:
     clearance: float = 1.0
     torque: float = 3.0
     near: float = 0.85
+    cautions: tuple[float, ...] = (1.0, 3.0)
+    parts: tuple[float, ...] = (1.0, 0.6, 0.3)
 
     def __post_init__(self) -> None:
         check_whole(self, iterations=0, robots=0, harmonics=0)
@@ -60,19 +68,33 @@ class RefineOptions:
 
 
 def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
-    """The search's result with its best gait refined, if that is better on all of the evaluator's robots. Only gaits that go
-    straight and aim at speed are refined: their mirror symmetry halves the unknowns."""
+    """The search's result with its best gait refined, if that is better on all of the evaluator's robots. Where the whole
+    change breaks a limit on them, parts of it are tried, then a change that weighs the limits more. Gaits that are better come
+    first, the gait before them next. Only gaits that go straight and aim at speed are refined: their mirror symmetry halves
+    the unknowns."""
     request, best = evaluator.request, found.best
     if not options.iterations or request.way not in STRAIGHT or request.aim != "speed" or best.nominal is None:
         return found
-    shape = gauss_newton(evaluator, best.shape, options, progress)
-    if shape == best.shape:
-        return found
-    progress("the refined gait on the ensemble", None)
-    (candidate,) = evaluator.judged([shape], len(evaluator.draws), list)
-    if candidate.nominal is None or candidate.rank() >= best.rank():
-        return replace(found, rollouts=evaluator.rollouts)
-    return replace(found, best=candidate, others=(best, *found.others), rollouts=evaluator.rollouts)
+    better: dict[GaitShape, Candidate] = {}
+    for caution in options.cautions:
+        weighed = {name: caution * getattr(options, name) for name in ("slip", "clearance", "torque")}
+        shape = gauss_newton(evaluator, best.shape, replace(options, **weighed), progress)
+        if shape == best.shape:
+            continue
+        progress("the refined gait on the ensemble", None)
+        tried = evaluator.judged([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
+        better |= {c.shape: c for c in tried if c.nominal is not None and c.rank() < best.rank()}
+        if tried[0].shape in better:
+            break
+    first, *others = [*sorted(better.values(), key=Candidate.rank)[:KEPT], best]
+    return replace(found, best=first, others=(*others, *found.others), rollouts=evaluator.rollouts)
+
+
+def _between(start: GaitShape, end: GaitShape, part: float) -> GaitShape:
+    """A shape with a part of the change of the angles."""
+    after = np.array(end.offsets)
+    before = np.array(start.offsets) if start.offsets else np.zeros_like(after)
+    return replace(end, offsets=tuple(tuple(row) for row in (before + part * (after - before)).tolist()))
 
 
 def gauss_newton(evaluator: Evaluator, shape: GaitShape, options: RefineOptions, progress: Progress) -> GaitShape:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import cma
 import numpy as np
 
+from workbench.files import InputError
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
@@ -38,12 +39,12 @@ class Budget:
     """Size of the search, in numbers of gaits and not in seconds, so that the same seed ends in the same table. InputError for a
     number out of range.
 
-    seeds: random gaits at first, on the nominal robot. screened: the best of them, which are tried on `draws` robots of the
-    ensemble. starts: the best of those, of different families or knees, from which CMA-ES continues. population: of each
-    generation, all on the nominal robot, the better on the ensemble too. generations: in total. width: first standard deviation
-    in the unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit.
-    hopeless: it ends halfway if the best gait has less than this share of the speed. finalists: gaits that may go to the
-    certificate.
+    seeds: random gaits at first, on the nominal robot; 0 where the search is given a gait to start from. screened: the best
+    of them, which are tried on `draws` robots of the ensemble. starts: the best of those, of different families or knees,
+    from which CMA-ES continues. population: of each generation, all on the nominal robot, the better on the ensemble too.
+    generations: in total. width: first standard deviation in the unit cube. enough: a search for a given speed ends after so
+    many generations in a row that kept every limit. hopeless: it ends halfway if the best gait has less than this share of
+    the speed. finalists: gaits that may go to the certificate.
     """
 
     seeds: int = 120
@@ -58,7 +59,7 @@ class Budget:
     finalists: int = 8
 
     def __post_init__(self) -> None:
-        check_whole(self, seeds=1, screened=1, starts=1, population=2, generations=0, draws=0, enough=1, finalists=1)
+        check_whole(self, seeds=0, screened=1, starts=1, population=2, generations=0, draws=0, enough=1, finalists=1)
         check_positive(self, "width")
 
 
@@ -80,10 +81,13 @@ class Found:
 
 
 def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, given: Sequence[GaitShape] = ()) -> Found:
-    """Searches for a gait for the evaluator's request. given: initial shapes, in addition to the random ones."""
+    """Searches for a gait for the evaluator's request. given: initial shapes, in addition to the random ones. InputError where
+    there are none of either kind."""
     space = space_of(evaluator.machine, evaluator.request)
     run = _Run(evaluator, budget, space, progress)
-    shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]
+    shapes = [*given, *(seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed) if budget.seeds else ())]
+    if not shapes:
+        raise InputError(None, "seeds: expected 1 or more, or a gait to start from, got 0")
     runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seeded(shapes))]
     for k in range(budget.generations):
         together = k < IN_TURN * len(runs)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from workbench.gait.limits import Margin
@@ -34,11 +34,11 @@ class Condition:
         return model.with_effects((*model.effects, *self.effects))
 
 
-def conditions(frictions: Sequence[float] = FRICTIONS, supplies: Sequence[float] = SUPPLIES) -> tuple[Condition, ...]:
+def conditions() -> tuple[Condition, ...]:
     """The nominal robot, then each friction, each supply, and the gait entered at once."""
     return (Condition(AS_IT_IS),
-            *(Condition(f"friction {f:g}", (EffectSpec("ground_friction", (), {"friction": f}),)) for f in frictions),
-            *(Condition(f"{v:g} V", (EffectSpec("supply_voltage", (), {"voltage": v}),)) for v in supplies),
+            *(Condition(f"friction {f:g}", (EffectSpec("ground_friction", (), {"friction": f}),)) for f in FRICTIONS),
+            *(Condition(f"{v:g} V", (EffectSpec("supply_voltage", (), {"voltage": v}),)) for v in SUPPLIES),
             Condition(AT_ONCE, at_once=True))
 
 

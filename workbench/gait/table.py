@@ -99,13 +99,13 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool
     shape, q, small, stand = paths.shape, paths.q, paths.small, paths.stand
     goals = _within(machine, q, q + shape.lead * machine.droop(shape, q, paths.stance)) if led and shape.lead else q
     dwells = _dwells(shape)
-    cycle = _table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
+    cycle = pose_table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
     neutral = np.zeros_like(stand)
     there, back = np.array(WAYS), np.array(WAYS[::-1])
-    start = [_table(machine, np.vstack([stand, stand]), np.vstack([neutral, stand]), there, 1.0, source),
-             _table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
-    stop = [_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
-            _table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
+    start = [pose_table(machine, np.vstack([stand, stand]), np.vstack([neutral, stand]), there, 1.0, source),
+             pose_table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
+    stop = [pose_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
+            pose_table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
     return GaitTable(shape, cycle, joined(start, source), joined(stop, source), paths.off, q)
 
 
@@ -122,8 +122,10 @@ def _dwells(shape: GaitShape) -> NDArray[np.int64]:
     return np.maximum(np.diff(arrivals), 1)
 
 
-def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np.int64], hurry: float, source: str) -> PoseTable:
-    """Goals (P, n) [rad], each reached from `before` (P, n) at the end of its dwell, or as fast as the servo can."""
+def pose_table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np.int64], hurry: float, source: str
+               ) -> PoseTable:
+    """Goals (P, n) [rad], each reached from `before` (P, n) at the end of its dwell [ms], or `hurry` times as fast, or as fast as
+    the servo can."""
     units = machine.units
     counts = np.array([u.centre for u in units]) + np.round(goals / np.array([u.count for u in units])).astype(np.int64)
     speed = hurry * np.abs(goals - before) / (dwells[:, None] / 1000) / machine.speed_unit

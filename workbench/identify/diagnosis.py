@@ -25,10 +25,10 @@ from workbench.identify.evidence.explain import explained_by_evidence, is_by_log
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.judge import COMPILED, EnginesPartError, judged
+from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
 from workbench.identify.options import PROBLEM, READ_OFF
-from workbench.identify.preparation import check_duration, prepared
+from workbench.identify.preparation import check_duration, prepare
 from workbench.identify.problem import channel_gaps
 from workbench.identify.proposals import candidates
 from workbench.identify.results.findings import Diagnosis
@@ -101,40 +101,40 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         session.with_model(previous)  # refuses another robot
         session = session.with_model(session.model.with_physics(previous.servos, previous.effects))
     if engine == "drake":
-        return _diagnosed(session, replace(config, engine="drake"), settings, {"rollouts by": "Drake"})
+        return _diagnose(session, replace(config, engine="drake"), settings, {"rollouts by": "Drake"})
     try:
-        return _diagnosed(session, config, settings, {"rollouts by": COMPILED})
+        return _diagnose(session, config, settings, {"rollouts by": COMPILED})
     except EnginesPartError as why:
         progress(f"{why}: again by Drake", None)
         by_drake = {"rollouts by": "Drake", "because": str(why)}
-        return _diagnosed(session, replace(config, engine="drake"), settings, by_drake)
+        return _diagnose(session, replace(config, engine="drake"), settings, by_drake)
 
 
-def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, engine: Mapping[str, str]) -> DiagnosisResult:
+def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, engine: Mapping[str, str]) -> DiagnosisResult:
     """By one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
     progress = settings.progress
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
-    seen = prepared(session, takes, config, settings.n_jobs, progress)
+    seen = prepare(session, takes, config, settings.n_jobs, progress)
     check_duration(session, seen.evidence)
     evaluator = RolloutEvaluator(seen.evidence, config, settings.n_jobs, settings.memory)
-    nominal = Search(evaluator, session.model).evaluated([])
+    nominal = Search(evaluator, session.model).evaluate([])
     progress("judging the engine", None)
-    apart = {BESIDE_DRAKE.format("nominal"): judged(evaluator, session.model, "nominal")}
+    apart = {BESIDE_DRAKE.format("nominal"): judge_by_drake(evaluator, session.model, "nominal")}
 
     # 2. The gap: where, when and in which layer they differ from the nominal model
     gap = ledger(seen.evidence, nominal.residuals)
 
     # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames
     measured = geometry_of(session.model, evaluator.evidence, nominal.residuals) if gap else Geometry()
-    build = _believed(measured, evaluator, session.model, nominal)
+    build = _check_geometry(measured, evaluator, session.model, nominal)
     read_off = (*build.measured, *read_off_registers(session))
     build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
     sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
     evidence = sent.evidence
-    begun = Search(sent, known.model).evaluated([])
+    begun = Search(sent, known.model).evaluate([])
     played = TakesAsPlayed(sent, without=settings.without)
     evaluator, missed = played.without_missed(known.model, begun.residuals)
     pool = build.asked(candidates(known.model, evidence)) + read_off_candidates(known.model, evidence, begun.residuals)
@@ -151,7 +151,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     fitted = found.model
     after, floors = found.left_by(evaluator, progress)
     progress("judging the engine", None)
-    apart[BESIDE_DRAKE.format("final")] = judged(evaluator, fitted, "final")
+    apart[BESIDE_DRAKE.format("final")] = judge_by_drake(evaluator, fitted, "final")
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
@@ -178,12 +178,12 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))
 
 
-def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:
+def _check_geometry(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:
     """The measured geometry of the robot, unless it makes the residuals larger; it need not make them smaller, since combined
     with other missing effects even the right leg length may walk the wrong way."""
     if not build.measured:
         return build
-    there = Search(evaluator, build.added_to(model)).evaluated([])
+    there = Search(evaluator, build.added_to(model)).evaluate([])
     worse = (there.cost["fit"] + there.cost["choose"]) / (nominal.cost["fit"] + nominal.cost["choose"]) - 1.0
     return build if worse < READ_OFF.geometry_worse else replace(build, measured=())
 
@@ -191,7 +191,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:
     """Rollouts of the robot with its measured geometry, whose numerical floor and contact spread are its own."""
     read = [replace(t, model=known.model_of(t.spec)) for t in takes]
-    return evaluator.on(prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
+    return evaluator.on(prepare(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
 
 
 def _reports(

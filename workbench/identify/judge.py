@@ -21,7 +21,7 @@ class EnginesPartError(ArithmeticError):
     """The compiled station and Drake disagree on a model; the text gives the difference."""
 
 
-def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
+def judge_by_drake(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
     """Difference between the engine of a search and Drake on a model, RMS over sigma of the worst channel, of one take nearly
     whole and of the others' beginnings. 0 where rollouts are Drake's already. EnginesPartError beyond
     `ProblemOptions.engines_apart`; name: of the model, for its text."""

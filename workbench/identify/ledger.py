@@ -10,7 +10,7 @@ from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
 from workbench.effects.base import Layer
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, running_means
 from workbench.identify.results.findings import GapEntry
 from workbench.types import Array
 
@@ -78,7 +78,7 @@ def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
     order."""
     t = e.take.recorded.time
     n = round(PROBLEM.smoothing / e.frame_time)
-    mean = smoothed(residual[:, None], n)[:, 0]
+    mean = running_means(residual[:, None], n)[:, 0]
     power = np.convolve(np.nan_to_num(np.square(mean)), np.ones(3 * n) / (3 * n), mode="same")
     inside = np.concatenate([[False], power > 9.0, [False]])
     edges = np.flatnonzero(np.diff(inside.astype(int)))

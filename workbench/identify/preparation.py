@@ -17,7 +17,7 @@ from workbench.compare.session_takes import LeftOut, ReadTake, RegisteredTake, r
 from workbench.files import InputError
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, part_of, running_sum
-from workbench.identify.shooting import base_states, unsettled
+from workbench.identify.shooting import base_states, unsettled_frames
 from workbench.recording.servo_log.goal_stamps import STAMPS
 from workbench.recording.take import Take
 from workbench.simulation import SimulationConfig
@@ -34,20 +34,20 @@ class Prepared:
     left_out: LeftOut
 
 
-def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> Prepared:
+def prepare(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> Prepared:
     """Rolls out the session's model for each take, registers the takes against these rollouts, and resets the simulated base of
     floating-base takes to the recorded one at the beginning of each window."""
-    def rolled(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
+    def roll(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
         runs = [run_of(t, steadied.get(t.spec.name)) for t in these]
         return {r.name: of for r, of in zip(runs, roll_out(runs, config, progress=progress, n_jobs=n_jobs, floors=floors))}
 
-    rollouts = (rolled([t for t in takes if t.spec.base != "free"], {})
-                | rolled([t for t in takes if t.spec.base == "free"], {}, floors=False))
+    rollouts = (roll([t for t in takes if t.spec.base != "free"], {})
+                | roll([t for t in takes if t.spec.base == "free"], {}, floors=False))
     nominal = {name: r.nominal for name, r in rollouts.items()}
     registered, left_out = register_takes(session, takes, nominal, progress)
     walking = [t for t in registered if t.spec.base == "free"]
     steadied = {t.spec.name: base_states(t.recorded) for t in walking}
-    rollouts |= rolled(walking, steadied)  # fixed-base takes are judged by what they were registered with
+    rollouts |= roll(walking, steadied)  # fixed-base takes are judged by what they were registered with
     return Prepared(gather(registered, rollouts, steadied), nominal, left_out)
 
 
@@ -76,7 +76,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     recorded = channels_of(t.recorded, names)
     moving = t.recorded.time >= t.measurement.starts_at
     if steadied is not None:
-        moving &= ~unsettled(steadied, t.recorded.since_start)
+        moving &= ~unsettled_frames(steadied, t.recorded.since_start)
     if t.start_state() is not None:
         moving &= t.recorded.since_start >= PROBLEM.forgets
     nominal = channels_of(t.observed(r.nominal), names)

@@ -100,7 +100,7 @@ class TakeEvidence:
         """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. model: that was simulated;
         corrected: for the search's step."""
         simulated = simulated + self.offset if corrected else simulated
-        simulated = self._shifted(self._lying_in_its_play(simulated, model))
+        simulated = self._shift(self._lying_in_its_play(simulated, model))
         return (self.recorded - simulated) / self._frame_sigma
 
     @property
@@ -123,7 +123,7 @@ class TakeEvidence:
                     out[:, i] += np.clip(np.nanmedian(off), -play, play)
         return out
 
-    def _shifted(self, simulated: Array) -> Array:
+    def _shift(self, simulated: Array) -> Array:
         """Shifted later by the median over the joints: a start that one bad joint cannot move."""
         time, late, n = self.take.recorded.time, 0.0, len(self.joints)
         used = ~self.uses["validate"]
@@ -155,7 +155,7 @@ def running_sum(columns: Array, frames: int) -> Array:
     return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
 
 
-def smoothed(residual: Array, frames: int) -> Array:
+def running_means(residual: Array, frames: int) -> Array:
     """Running means of residuals (N, c) over `frames`, scaled to stay 1 where they are white noise of 1; NaN stays."""
     known = np.isfinite(residual)
     total, count = running_sum(np.where(known, residual, 0.0), frames), running_sum(known.astype(float), frames)
@@ -166,7 +166,7 @@ def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: boo
     """RMS of residual over sigma, by channel; on all frames after the first command, or those of one use. smooth: of running
     means, in which noise averages out."""
     if smooth:
-        residual = smoothed(residual, round(PROBLEM.smoothing / e.frame_time))
+        residual = running_means(residual, round(PROBLEM.smoothing / e.frame_time))
     rows = residual[e.moving] if use is None else residual[e.uses[use]]
     count = np.isfinite(rows).sum(axis=0)
     value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))

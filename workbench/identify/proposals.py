@@ -28,7 +28,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
     for effect in known_effects().values():
         if effect.layer == "measurement" or not effect.from_neutral or not effect.could_act(model, sent):
             continue
-        if not free and (not effect.observable_when_fixed or (effect.hidden_by_zeroing and _zeroed(evidence))):
+        if not free and (not effect.observable_when_fixed or (effect.hidden_by_zeroing and _is_zeroed(evidence))):
             continue
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
@@ -42,7 +42,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
     return out
 
 
-def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
+def _is_zeroed(evidence: Sequence[TakeEvidence]) -> bool:
     return all(e.take.recorded.zeroed for e in evidence)
 
 

@@ -49,7 +49,7 @@ def _state(t: Array, p_WB: Array, quat_WB: Array) -> tuple[Array, Array, Array]:
     return (Rotation.from_rotvec(turn) * middle).as_quat(scalar_first=True), v, w
 
 
-def unsettled(states: BaseStates, since: Array) -> Mask:
+def unsettled_frames(states: BaseStates, since: Array) -> Mask:
     """Frames (N,) that tell nothing, as feet have yet to find the floor."""
     frame = float(np.median(np.diff(since)))
     after = since[:, None] - states.times

@@ -46,11 +46,6 @@ class MtnPage:
     pauses: Array
     times: Array
 
-    @property
-    def compliance_slopes(self) -> NDArray[np.int64]:
-        """Softness as the servo's compliance slope (I,) [counts]: 2 to the power of the level."""
-        return np.asarray(2**self.compliance, dtype=np.int64)
-
     def __str__(self) -> str:
         return f"page {self.number} '{self.name}'" if self.name else f"page {self.number}"
 

@@ -64,7 +64,7 @@ class Measurement:
     in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
     rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the
     base's tilt there; a recorded zero is this pose. joint_starts: start estimated from each joint alone [s].
-    pivot_residual: asset -> RMS [m] by which its positions miss the kinematic tree. frames: asset -> rotation vector (3,) [rad],
+    frames: asset -> rotation vector (3,) [rad],
     in its own frame (the capture's axes, at rest), of the error of its stated orientation; about its pivot, which is unchanged.
     The rest are standard deviations.
     """
@@ -82,5 +82,4 @@ class Measurement:
     starts_at_sigma: float = float("nan")
     yaw_sigma: float = float("nan")
     pivot_sigma: Mapping[str, Array] = field(default_factory=dict)
-    pivot_residual: Mapping[str, float] = field(default_factory=dict)
     frames: Mapping[str, Array] = field(default_factory=dict)

@@ -145,12 +145,12 @@ def _parse(path: Path, text: str | None = None) -> Kinematics:
 
     from workbench.files.resources import ConfigureParser
     from workbench.robot.model_source.checks import drake_error, quiet_drake
-    from workbench.robot.model_source.prepare import named
+    from workbench.robot.model_source.prepare import user_file
 
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
     ConfigureParser(parser)
-    source = named(path)
+    source = user_file(path)
     try:
         with quiet_drake():
             instances = parser.AddModels(str(path)) if text is None else parser.AddModelsFromString(text, "sdf")

@@ -18,7 +18,7 @@ from workbench.files.nearest import did_you_mean
 from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
-from workbench.robot.model_source import ModelSource, model_problems, prepared
+from workbench.robot.model_source import ModelSource, model_problems, prepare
 from workbench.robot.mounting import Mounting
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import ServoConstants
@@ -93,7 +93,7 @@ class RobotModel:
     @cached_property
     def source(self) -> ModelSource:
         """The file of the description, and what Drake reads of it."""
-        return prepared(resolve_model(self.description), self.packages)
+        return prepare(resolve_model(self.description), self.packages)
 
     @property
     def path(self) -> Path:

@@ -20,8 +20,8 @@ LEAD = 0.3
 
 
 def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int | None = None,
-               duration: float | None = None, lead: float = LEAD) -> Job:
-    """A motion played `cycles` times (None: as often as its file says), or for `duration` [s] of that, after `lead` [s] of rest.
+               duration: float | None = None) -> Job:
+    """A motion played `cycles` times (None: as often as its file says), or for `duration` [s] of that, after `LEAD` of rest.
 
     A servo gets the firmware's commands, rounded as there. An ideal joint follows the angles themselves, by a smooth cubic, as
     in the thesis's inverse dynamics.
@@ -29,7 +29,7 @@ def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycl
     cycles = motion.often(cycles)
     commands = motion.commands(cycles)
     trajectory = smooth_trajectory(model, config, motion, cycles) if config.drive == "ideal" else None
-    return Job(model, config, commands, commands.end if duration is None else duration, lead, trajectory, name=motion.name)
+    return Job(model, config, commands, commands.end if duration is None else duration, LEAD, trajectory, name=motion.name)
 
 
 def smooth_trajectory(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.spatial.transform import Rotation
 
-from workbench.effects.apply import physics_of, played
+from workbench.effects.apply import apply_to_commands, physics_of
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.smoothing import interpolate
@@ -118,7 +118,7 @@ class Simulation:
             raise InputError(None, "drive 'playback' shows a take; call play_back")
         sent = commands
         if commands is not None:
-            commands = played(commands.reordered(self.joints), self.model)
+            commands = apply_to_commands(commands.reordered(self.joints), self.model)
         if duration is None:
             if trajectory is not None:
                 duration = float(trajectory[0][-1])

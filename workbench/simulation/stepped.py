@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.effects.apply import played
+from workbench.effects.apply import apply_to_commands
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
@@ -38,7 +38,7 @@ class SteppedRun:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
         self._check_alive()
         self._sent = followed(self._sent, commands.reordered(self._simulation.joints), self.time)
-        self._played = played(self._sent, self._simulation.model)
+        self._played = apply_to_commands(self._sent, self._simulation.model)
 
     def advance(self, seconds: float) -> None:
         """Advances the run by `seconds`, rounded to whole steps of the log."""
@@ -61,7 +61,9 @@ class SteppedRun:
         return self.state.base
 
     def take(self, name: str = "simulation") -> Take:
-        """The take logged so far, from the start of the run."""
+        """The take logged so far, from the start of the run; RuntimeError before the first `advance`."""
+        if not self._sampled:
+            raise RuntimeError("nothing was simulated yet: call advance() before take()")
         self._check_alive()
         sampled = np.concatenate([*self._sampled, np.empty(0)])
         unique, rows = np.unique(sampled, return_index=True)

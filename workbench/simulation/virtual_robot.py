@@ -23,7 +23,7 @@ from workbench.device.virtual import (
     VirtualServo,
 )
 from workbench.device.virtual.motive import Pose, Scene
-from workbench.effects.apply import physics_of, played, resolved, seen
+from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of, resolved
 from workbench.effects.base import Effect
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -37,6 +37,8 @@ from workbench.types import Array
 
 FAMILIES = {"AX-12A": AX12A, "MX-28": MX28, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
 """Families of which there is a virtual servo, by the name of their profile."""
+ROTATION_NOISE, POSITION_NOISE = float(np.deg2rad(0.12)), 1e-4
+"""Standard deviations of the cameras' noise about and along each axis [rad, m]."""
 PIVOT = 0.012
 """How far a rigid body's pivot may lie from its link's origin, along each axis [m]: as wide as a marker cluster."""
 
@@ -142,15 +144,13 @@ class VirtualRobot:
 
     def controller(self, commands: Commands) -> Commands:
         """A motion's commands after the robot's controller: delayed, dropped or mixed up by the model's effects."""
-        return played(commands.reordered(self.model.joints), self.model)
+        return apply_to_commands(commands.reordered(self.model.joints), self.model)
 
-    def scene(self, started: float, seed: int = 0, rotation_noise: float = float(np.deg2rad(0.12)),
-              position_noise: float = 1e-4) -> tuple[tuple[str, ...], Scene, float, float]:
+    def scene(self, started: float, seed: int = 0) -> tuple[tuple[str, ...], Scene, float, float]:
         """What cameras saw from the rest before the first pose on: names of the bodies, their poses by the time since then, when
         that was and until when [s on the bus's clock].
 
-        started: when the first pose was sent [s on the bus's clock]. Noise: standard deviations about and along each axis
-        [rad, m]; a yaw and pivots by `seed`.
+        started: when the first pose was sent [s on the bus's clock]. A yaw, pivots and the noise by `seed`.
         """
         rng = np.random.default_rng(seed)
         let_go = self.body.let_go
@@ -158,12 +158,12 @@ class VirtualRobot:
         take = self.body.take(started - let_go / SECOND)
         begin = max(take.time[0], -0.9)
         rest = take.resampled(take.time[take.time >= begin - 1e-9])
-        measurement = seen(self._measurement(rest, rng), self.model)
+        measurement = apply_to_measurement(self._measurement(rest, rng), self.model)
         times = rest.time - rest.time[0]
         _, tracks = observe(rest, measurement, self.model, times)
         names = tuple(tracks)
-        p = {n: t.p + rng.normal(0, position_noise, t.p.shape) for n, t in tracks.items()}
-        quat = {n: _shaken(t.quat, rng.normal(0, rotation_noise, t.p.shape)) for n, t in tracks.items()}
+        p = {n: t.p + rng.normal(0, POSITION_NOISE, t.p.shape) for n, t in tracks.items()}
+        quat = {n: _shaken(t.quat, rng.normal(0, ROTATION_NOISE, t.p.shape)) for n, t in tracks.items()}
 
         def scene(t: float) -> Mapping[str, Pose]:
             k = min(max(round(t / self.body.step), 0), len(times) - 1)

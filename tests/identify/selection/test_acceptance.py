@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.identify.small import fit_of
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
@@ -37,7 +38,7 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
     residual = nominal.residuals[0].copy()
     residual[:, n] *= 30
     before = replace(nominal, residuals={0: residual})
-    search = search.with_settled(replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals))
+    search = search.with_settled(replace(search.evaluate([(taken, np.array([2.6]))]), residuals=nominal.residuals))
     first = SelectionStep(before, (), (CandidateFit(taken, np.array([2.6]), {"fit": 1e6, "choose": 1e6}, "three"),))
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
 
@@ -101,7 +102,7 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_fixed_base_takes_id
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = partial(leaving, worn)
     first = SelectionStep(fit(three=100.0, two=15.0), (), (CandidateFit(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
-    search = search.with_settled(replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals))
+    search = search.with_settled(replace(search.evaluate([(fade, np.ones(1))]), residuals=nominal.residuals))
     monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: True)
     assert not acceptance.too_little_left(search, fit(two=13.0), (0,), [first])
     assert acceptance.too_little_left(search, fit(three=13.0), (0,), [first])
@@ -137,7 +138,7 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
 def test_what_fixed_base_takes_identified_is_judged_on_them_alone(monkeypatch):
     monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
     c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
-    fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
+    fit = fit_of((), {0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
         search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
@@ -152,7 +153,7 @@ def test_what_floating_base_takes_identify_of_a_joint_is_judged_by_its_own_gap_a
         return Candidate.of(known_effects()[name], (joint,), (0.0,) * len(known_effects()[name].parameters))
 
     own_effect, other = of("coulomb_friction", "two"), of("backlash", "three")
-    fit = SimpleNamespace(residuals={0: np.ones(1)}, effects=(own_effect, other))
+    fit = fit_of((own_effect, other), {0: np.ones(1)})
     trial = CandidateFit(own_effect, np.ones(1), {}, None)
     for own, elsewhere, share in ((1.0, 0.6, 0.8), (0.0, 0.6, 0.6), (0.2, 0.6, 0.6)):  # a zero shows in other joints alone
         shares = {("two", ()): own, (None, ()): 0.2, (None, ("three",)): elsewhere}
@@ -167,7 +168,7 @@ def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
     def accepted(name, *where):
         return (CandidateFit(Candidate.of(known_effects()[name], where, (0.0,)), np.ones(1), {}, None),)
 
-    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), SimpleNamespace()
+    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), fit_of()
     rounds = [SelectionStep("nominal", (), clock), SelectionStep("nominal", (), frame)]
     assert before_rough(rounds, now) is now
     assert before_rough([*rounds, SelectionStep("seen rightly", (), sag)], now) == "seen rightly"
@@ -180,7 +181,7 @@ def test_what_fine_steps_do_not_miss_is_idle_where_floating_base_takes_identifie
     search = Search(whole.evaluator, session.model)
     load = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.name == "payload")
     friction = Candidate.of(known_effects()["coulomb_friction"], ("three",), (0.06,))
-    fit = replace(search.evaluated([(load, np.ones(load.size)), (friction, np.ones(1))]), cost={"choose": 1e4})
+    fit = replace(search.evaluate([(load, np.ones(load.size)), (friction, np.ones(1))]), cost={"choose": 1e4})
     asked_without = []
 
     def finely(fit, takes, *points):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
+from tests.identify.small import search_on
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
@@ -49,9 +50,9 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
 
 
 def test_a_walk_and_what_one_explains_are_left_to_single_effects():
-    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: True))
+    search = search_on("free")
     assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
-    held = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: False))
+    held = search_on("fixed")
     assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
     assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
 
@@ -85,7 +86,7 @@ def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_fa
 
     search = SimpleNamespace(side_by_side=lambda parts: list(together(dict(enumerate(parts)), lambda wanted: []).values()),
                              evaluating=lambda *starts: asks_nothing([fit_at(s, 1e4) for s in starts]),
-                             refitting=lambda *a: asks_nothing(ended(*a)), refitted=ended)
+                             refitting=lambda *a: asks_nothing(ended(*a)), refit=ended)
     here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + FIT.least_gain * 3)
     there = begun_again(search, here, (0,), 9)
     assert (there is not here) is again

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.identify.small import fit_of, leaving, search_on
 from workbench.compare.channels import ACROSS
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
@@ -28,18 +29,17 @@ from workbench.robot import puppy_model
 def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatch, gaps, expected):
     named = {c.replace(" across ", ACROSS): s for c, s in gaps.items()}
     monkeypatch.setattr(scheduling, "channel_gaps", lambda e, residual: named)
-    search = SimpleNamespace(floating_base=lambda takes: takes, evaluator=SimpleNamespace(evidence=[None]),
-                             nominal=SimpleNamespace(joints=("one", "two")))
-    assert scheduling.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
-    search.floating_base = lambda takes: ()
-    assert scheduling.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
+    model = SimpleNamespace(joints=("one", "two"))
+    walking, held = (Search(search_on(base).evaluator, model) for base in ("free", "fixed"))
+    assert scheduling.standing_out(walking, fit_of((), {0: leaving(0.0)}), (0,)) == expected
+    assert scheduling.standing_out(held, fit_of((), {0: leaving(0.0)}), (0,)) == set()
 
 
 @pytest.mark.parametrize(("base", "tier", "said"),
                          [("fixed", 2, False), ("free", 2, False), ("free", SCHEDULING.tiers_of_all, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
     """A load on the hand looks like a weak shoulder."""
-    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"), floating_base=lambda takes: ())
+    search = search_on(base)
     shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
     for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
         trial = CandidateFit(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
@@ -53,7 +53,7 @@ def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_fr
     effect = known_effects()[name]
     heard = Candidate.of(effect, () if name == "soft_ground" else ("body",), effect.neutral(None))
     trial = CandidateFit(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
-    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"))
+    search = search_on(base)
     assert forward._tips(search, trial, (0,), tier) is tips
 
 
@@ -67,7 +67,7 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     trials = [
         CandidateFit(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))
     ]
-    choices = forward._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
+    choices = forward._accept(sorted(trials, key=lambda t: -t.gain["choose"]))
     assert [[t.candidate.name for t in c] for c in choices] == [chosen]
 
 
@@ -81,7 +81,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
     trials = [CandidateFit(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
               for c, g, share in zip((soft, shifted), (565.0, gain), closed)]
-    assert [[t.candidate.name for t in c] for c in forward._accepted(trials)] == [[name] for name in chosen]
+    assert [[t.candidate.name for t in c] for c in forward._accept(trials)] == [[name] for name in chosen]
 
 
 @pytest.mark.parametrize(("base", "shares", "of_all"), [
@@ -89,8 +89,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     ("free", (0.1, 0.97, 0.99), False)])
 def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_more_one_lacks(monkeypatch, base, shares, of_all):
     """Beside another clock rate, play in one joint kept joints and sets of effects being asked until the limit of work."""
-    joints = [f"joint{n}" for n in range(len(shares))]
-    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"))
+    joints, search = [f"joint{n}" for n in range(len(shares))], search_on(base)
     monkeypatch.setattr(forward, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
     for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
         trial = CandidateFit(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
@@ -102,7 +101,7 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
     _, search, nominal = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
-    pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
+    pulled = fit_of([pull], nominal.residuals)
     for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
         asked_of = [scheduling.groups_to_try(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.fixed_base, tier)[0]
                     for tier in range(SCHEDULING.tiers)]

@@ -8,7 +8,7 @@ import pytest
 
 from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.covariance import clustered
+from workbench.identify.fitting.covariance import cluster_covariance
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest, together
 from workbench.identify.fitting.responses import linearised_estimate, scan, scan_sizes
@@ -110,7 +110,7 @@ def test_where_no_rival_is_predicted_enough_the_best_of_those_near_it_are_fitted
 def test_what_an_earlier_race_predicts_to_be_hopeless_is_not_looked_at_again(quiet):
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
-    current = search.evaluated([])
+    current = search.evaluate([])
     power = {i: search.evaluator.cost({i: r}, "fit") for i, r in current.residuals.items()}
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
     r0 = search.evaluator.vector(current.residuals, "fit")
@@ -220,11 +220,12 @@ def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_toget
     J = -np.ones((2000, 1))
     means = [np.mean(np.repeat(rng.normal(size=40), 50)) for _ in range(200)]  # of what is the same over a stretch
     r = np.repeat(rng.normal(size=40), 50)
-    told = np.sqrt(clustered(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
+    told = np.sqrt(cluster_covariance(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
     assert told == pytest.approx(np.std(means), rel=0.3)
     white = rng.normal(size=2000)
-    assert np.sqrt(clustered(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
-    assert np.isinf(clustered(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
+    variance = cluster_covariance(Solved(np.zeros(1), white, J), stretches)[0, 0]
+    assert np.sqrt(variance) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
+    assert np.isinf(cluster_covariance(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
 
 
 def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):
@@ -249,7 +250,7 @@ def test_every_number_of_a_vector_has_its_stretch(quiet):
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     session, evidence = quiet
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
-    well, ill = well_on_fixed_base(search, search.evaluated([]))
+    well, ill = well_on_fixed_base(search, search.evaluate([]))
     assert (well, ill) == (set(session.model.joints), set())
 
 

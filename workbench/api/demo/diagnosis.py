@@ -32,7 +32,7 @@ class Found:
     said: str
 
 
-def diagnosis_section(folder: Path, progress: Callable[[str, float | None], None], n_jobs: int = 2) -> Found:
+def diagnosis_section(folder: Path, progress: Callable[[str, float | None], None]) -> Found:
     """Diagnoses the bundled logs of an arm and writes the diagnosis into `folder`. progress: called with the current stage and
     the share done."""
 
@@ -40,7 +40,7 @@ def diagnosis_section(folder: Path, progress: Callable[[str, float | None], None
         progress(f"a diagnosis: {what}", done)
 
     session = load_session(data_file("tutorial_arm/session.yaml"))
-    found = diagnose_session(session, stage, n_jobs)
+    found = diagnose_session(session, stage, n_jobs=2)
     diagnosis: Diagnosis = found.diagnosis
     folder.mkdir(parents=True, exist_ok=True)
     write_diagnosis(diagnosis, found.takes, folder, "the tutorial's arm", stage)

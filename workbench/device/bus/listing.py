@@ -12,7 +12,6 @@ from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.survey import ALL_IDS, FIRST, FoundServo, Survey, survey
 from workbench.device.bus.wire import ping
-from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profiles
 from workbench.types import Progress
 
@@ -84,7 +83,7 @@ def _surveys(port: Any, strip_echo: bool, protocol: int, ids: list[int], tell: P
             out.append(survey(bus, None, own, lambda what, done: tell(f"{profile.name}: {what}", done)))  # noqa: B023
             left = [servo for servo in left if servo not in own]
     if left:
-        strangers = {servo: _stranger(Bus(port, profiles[0], strip_echo=strip_echo), servo, profiles) for servo in left}
+        strangers = {servo: _stranger(Bus(port, profiles[0], strip_echo=strip_echo), servo) for servo in left}
         if out:
             out[0] = replace(out[0], found=dict(out[0].found) | strangers)
         else:
@@ -92,7 +91,7 @@ def _surveys(port: Any, strip_echo: bool, protocol: int, ids: list[int], tell: P
     return out
 
 
-def _stranger(bus: Bus, servo: int, profiles: Iterable[ServoProfile]) -> FoundServo:
+def _stranger(bus: Bus, servo: int) -> FoundServo:
     number = 0
     with suppress(BusError, NoAnswerError):
         number = bus.exists(servo, tries=2) or 0

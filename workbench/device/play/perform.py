@@ -13,7 +13,6 @@ from workbench.device.play.log import NothingPlayedError, finish_log
 from workbench.device.play.options import Played, PlayOptions
 from workbench.device.play.plan import reading_plan
 from workbench.device.play.player import play
-from workbench.device.play.watch import WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 
@@ -27,17 +26,17 @@ def preflight(found: Survey) -> None:
 
 
 def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callable[[], str], options: PlayOptions | None = None,
-            watching: WatchOptions | None = None, progress: Callable[[str, float | None], None] | None = None) -> Played:
+            progress: Callable[[str, float | None], None] | None = None) -> Played:
     """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds the journal, which
     is deleted when the log is on the disk. BusError, or InputError, where it could not be played to a regular end; where it
     was stopped before there was anything to log, `log_problem` gives the reason."""
     preflight(found)
-    reading_plan(bus, len(found.found), commands, watching)
+    reading_plan(bus, len(found.found), commands)
     joints = [servo.joint for servo in found.found.values() if servo.joint is not None]
     path = log.with_suffix(".play")
     with PlayJournal(path, {"joints": joints, "family": bus.profile.name}) as journal:
         try:
-            played = play(bus, found, commands, journal, stop, options, watching, progress)
+            played = play(bus, found, commands, journal, stop, options, progress=progress)
         except BaseException:
             journal.close()
             _finish(path, log)

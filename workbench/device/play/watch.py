@@ -131,19 +131,16 @@ class Watch:
         self._count(servo, time, False)
 
     def _count(self, servo: int, time: float, answered: bool) -> None:
-        """Whether too many of its latest questions had no answer. One that has fallen silent for good is left to `check`; one
-        that was silent and answers again has restarted, which its registers tell."""
+        """Of its latest questions, whether too many had no answer; one that has fallen silent for good is left to `check`."""
         options, latest = self.options, self._questions[servo]
         latest.append((time, answered))
         while latest[0][0] <= time - options.silent:
             latest.popleft()
-        if answered:
-            return
         outcomes = [good for _, good in latest]
         failures = outcomes.count(False)
-        unsteady = any(outcomes[outcomes.index(False):])
-        if unsteady and failures >= max(options.failures, options.share * len(outcomes)):
-            self._doubt(servo, UNSTEADY.format(len(outcomes) - failures, len(outcomes), options.silent))
+        if failures < options.failures or failures < options.share * len(outcomes) or not any(outcomes[outcomes.index(False):]):
+            return
+        self._doubt(servo, UNSTEADY.format(len(outcomes) - failures, len(outcomes), options.silent))
 
     def check(self, time: float) -> None:
         """Whether every servo was heard not too long before a time [s]: silent where it was asked, unread where it was not."""

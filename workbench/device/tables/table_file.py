@@ -63,11 +63,10 @@ class TableFile:
     stops: bool = False
 
 
-def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | None = None) -> tuple[JointBounds, ...]:
+def bounds_of(table: PoseTable, model: RobotModel) -> tuple[JointBounds, ...]:
     """Bounds of a model's joints in counts, no narrower than the table's own goals (`export` has checked it, or was forced).
 
-    numbers: model number of each joint's servo (default: the AX-12A's). InputError for a table that the controller's program
-    cannot play.
+    InputError for a table that the controller's program cannot play.
     """
     other = unplayable(table)
     if other:
@@ -83,8 +82,7 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
         ends = sorted(min(max(zero + sign * (end - CENTRE), 0), LARGEST) for end in (low, high))
         no_load = float(servo.line.no_load_speed)
         bounds.append(JointBounds(
-            ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
-            low=ends[0], high=ends[1],
+            ids[joint], AX12A_NUMBER, low=ends[0], high=ends[1],
             fastest=max(1, min(LARGEST, round(no_load / AX12A.speed_unit)), int(table.speeds[:, i].max())),
             neutral=zero, direction=sign))
     return tuple(bounds)

@@ -1,7 +1,7 @@
 """Steering once a cycle: a model-predictive controller as a Drake system, and a proportional law to compare it with.
 
 Both run once a cycle. At the end of cycle k, cycle k+1 is already on the controller (an upload takes 0.2 s); they choose the turn
-of cycle k+2. Both estimate the robot's own turning bias and stride (`observer`).
+of cycle k+2. Both estimate the robot's own turning bias, gain and stride (`observer`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from workbench.gait.drive import observer as at
 from workbench.gait.drive.observer import first_state, observed
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
-from workbench.gait.drive.plan import Disc, Planned, corridor, plan, with_stride
+from workbench.gait.drive.plan import Disc, Planned, corridor, of_robot, plan
 from workbench.gait.drive.step_map import StepMap
 from workbench.types import Array
 
@@ -66,7 +66,7 @@ class CycleController(LeafSystem):
 
     def _decide(self, x: Array, left: float) -> float:
         """The turn of the cycle after next, from the state at the end of this one: first through the cycle that is committed."""
-        m, o = with_stride(self.map, x[at.AHEAD], x[at.ASIDE]), self.options
+        m, o = self._own(x), self.options
         along, left, heading = self._committed(x, left, m)
         if o.law == "proportional":
             off = heading - self.path.heading(along) + np.arctan(left / o.reach) + m.aside / m.ahead
@@ -75,11 +75,17 @@ class CycleController(LeafSystem):
             return limited(wanted / (m.gain + m.memory), x[at.NEXT], o)
         return limited(self._planned(along, left, heading, x, m).turns[0], x[at.NEXT], o)
 
+    def _own(self, x: Array) -> StepMap:
+        """The map of this robot, as it is estimated."""
+        return of_robot(self.map, x[at.AHEAD], x[at.ASIDE], x[at.GAIN])
+
     def _committed(self, x: Array, left: float, m: StepMap) -> tuple[float, float, float]:
         """Distance along the path, lateral error [m] and heading [rad] after the cycle that is on the controller already."""
         off = x[at.HEADING] - self.path.heading(x[at.ALONG])
-        left = left + m.ahead * np.sin(off) + m.aside + m.aside_gain * x[at.NEXT]
-        return x[at.ALONG] + m.ahead, left, x[at.HEADING] + m.turned(x[at.NEXT], x[at.PLAYED]) + x[at.BIAS]
+        along = x[at.ALONG] + m.ahead
+        bend = self.path.heading(along) - self.path.heading(x[at.ALONG])
+        left = left + m.ahead * np.sin(off - bend / 2) + m.aside + m.aside_gain * x[at.NEXT]
+        return along, left, x[at.HEADING] + m.turned(x[at.NEXT], x[at.PLAYED]) + x[at.BIAS]
 
     def _planned(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
         ahead = np.asarray(along + m.ahead * np.arange(self.options.horizon + 1), float)
@@ -90,7 +96,7 @@ class CycleController(LeafSystem):
     def planned_points(self, context: Context) -> Array:
         """Where the plan leads from the present state: positions (N + 1, 2) [m] from the cycle after next on."""
         x = np.array(context.get_discrete_state(0).value())
-        m = with_stride(self.map, x[at.AHEAD], x[at.ASIDE])
+        m = self._own(x)
         _, left = self.path.project(x[[at.X, at.Y]], x[at.ALONG])
         along, left, heading = self._committed(x, left, m)
         planned = self._planned(along, left, heading, x, m)

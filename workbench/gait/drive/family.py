@@ -19,10 +19,12 @@ from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
 """Turns are rounded to this [rad per stance], an eighth of the scatter of one cycle's heading: tables are made once for each."""
+PACE_RESOLUTION = 0.05
+"""Paces are rounded to this share of the gait's stride."""
 
 
 class GaitFamily:
-    """Cycles of one gait that differ in `turn` alone [rad per stance, to the left].
+    """Cycles of one gait that differ in `turn` [rad per stance, to the left] and in `pace`, the share of the gait's stride.
 
     The shape's own turn (its trim) is added to the requested turn. InputError where a table of the family cannot be made, because
     a goal is beyond the registers. Cycles begin at the pose (`phase` of the shape's cycle) that the joints reach most slowly, as
@@ -31,19 +33,19 @@ class GaitFamily:
 
     def __init__(self, machine: GaitMachine, shape: GaitShape) -> None:
         self.machine, self.shape = machine, shape
-        self._tables: dict[int, GaitTable] = {}
+        self._tables: dict[tuple[int, int], GaitTable] = {}
         self.phase = _calmest(self._table(0.0).cycle)
 
-    def cycle(self, turn: float, before: float = 0.0) -> PoseTable:
-        """One cycle after one with the turn `before`, whose last goals are elsewhere: the joints' speeds into its first pose are
-        those of that way. The controller's program checks that the pose is within reach of them."""
-        return self._entered(self._loop(turn), before)
+    def cycle(self, turn: float, before: float = 0.0, pace: float = 1.0, pace_before: float = 1.0) -> PoseTable:
+        """One cycle after one with the turn and pace `before`, whose last goals are elsewhere: the joints' speeds into its first
+        pose are those of that way. The controller's program checks that the pose is within reach of them."""
+        return self._entered(self._loop(turn, pace), self._loop(before, pace_before))
 
     def stop(self, before: float = 0.0) -> PoseTable:
         """From a cycle with the turn `before` to neutral, going straight."""
         straight = self._table(0.0)
         rest = _part(straight.cycle, slice(self.phase, None))
-        return self._entered(joined([rest, straight.stop], "drive"), before)
+        return self._entered(joined([rest, straight.stop], "drive"), self._loop(before, 1.0))
 
     @property
     def start(self) -> PoseTable:
@@ -66,18 +68,23 @@ class GaitFamily:
         cycles = [self.cycle(u, before) for before, u in zip((0.0, *turns), turns)]
         return joined([self.start, *cycles], "drive").commands(1)
 
-    def _table(self, turn: float) -> GaitTable:
-        key = round(turn / RESOLUTION)
+    def shape_of(self, turn: float, pace: float = 1.0) -> GaitShape:
+        """The shape whose cycles have this turn and pace, rounded as the family's tables are."""
+        turn, pace = round(turn / RESOLUTION) * RESOLUTION, round(pace / PACE_RESOLUTION) * PACE_RESOLUTION
+        return replace(self.shape, turn=self.shape.turn + turn, stride=self.shape.stride * pace)
+
+    def _table(self, turn: float, pace: float = 1.0) -> GaitTable:
+        key = round(turn / RESOLUTION), round(pace / PACE_RESOLUTION)
         if key not in self._tables:
-            self._tables[key] = gait_table(self.machine, replace(self.shape, turn=self.shape.turn + key * RESOLUTION), "drive")
+            self._tables[key] = gait_table(self.machine, self.shape_of(turn, pace), "drive")
         return self._tables[key]
 
-    def _loop(self, turn: float) -> PoseTable:
-        cycle = self._table(turn).cycle
+    def _loop(self, turn: float, pace: float) -> PoseTable:
+        cycle = self._table(turn, pace).cycle
         return _part(cycle, np.roll(np.arange(len(cycle)), -self.phase))
 
-    def _entered(self, table: PoseTable, before: float) -> PoseTable:
-        way = np.abs(table.goals[0] - self._loop(before).goals[-1]) * np.array([u.count for u in table.units])
+    def _entered(self, table: PoseTable, before: PoseTable) -> PoseTable:
+        way = np.abs(table.goals[0] - before.goals[-1]) * np.array([u.count for u in table.units])
         needed = np.ceil(self.shape.hurry * way / (table.dwells_ms[0] / 1000) / self.machine.speed_unit)
         speeds = table.speeds.copy()
         speeds[0] = np.clip(needed, 1, self.machine.fastest)

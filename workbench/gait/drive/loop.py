@@ -60,7 +60,7 @@ class Driven:
         assert self.take.quat_WB is not None
         assert self.take.p_WB is not None
         yaw = np.unwrap(heading(self.take.quat_WB))
-        begin = self.take.time[0] + self._first_end(period)
+        begin = self.take.time[0] + self._first_end()
         out = np.full(len(self.poses), np.nan)
         for k in range(1, len(self.poses)):
             inside = (self.take.time > begin + (k - 1) * period + 1e-9) & (self.take.time <= begin + k * period + 1e-9)
@@ -72,7 +72,7 @@ class Driven:
             out[k] = np.mean(errors)
         return out
 
-    def _first_end(self, period: float) -> float:
+    def _first_end(self) -> float:
         """When the start section ends [s after the take's first row]: the row whose pose is the first one judged."""
         assert self.take.p_WB is not None
         far = np.hypot(*(self.take.p_WB[:, :2] - self.poses[0, :2]).T)

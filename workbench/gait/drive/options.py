@@ -19,7 +19,9 @@ class DriveOptions:
     feet of two tables no longer meet. aside, turned: errors that weigh the same [m], [rad]: 3 cm and 6 deg. change: change of
     turn that weighs as much [rad]. reach: distance over which the proportional law removes a lateral error [m]; below 0.5 m the
     two cycles of delay make it oscillate. drift: how fast the robot's own bias may change [rad per cycle], with voltage and
-    floor. first_bias: standard deviation of the bias before the first observation [rad per cycle]. noise: of a captured heading
+    floor. first_bias: standard deviation of the bias before the first observation [rad per cycle]. first_gain: standard deviation
+    of the share by which the robot's response to a turn differs from the map's; random puppies have 0.86 to 1.2 times the nominal
+    gain. noise: of a captured heading
     [rad]. stride_gain: share of the difference between a measured step and its estimate by which the estimate changes; at 0.2
     the scatter of a step, about 3 mm, leaves an estimate within 1 mm. lost: cycles without a pose after which the robot stops;
     it walks 20 cm in four. clearance: from a disc to the robot's origin beyond the disc's radius [m]: half of the puppy's width
@@ -37,6 +39,7 @@ class DriveOptions:
     reach: float = 0.6
     drift: float = 0.002
     first_bias: float = 0.05
+    first_gain: float = 0.15
     noise: float = 0.0021
     stride_gain: float = 0.2
     blind: float = 1.5
@@ -46,5 +49,5 @@ class DriveOptions:
     def __post_init__(self) -> None:
         check_choice("law", self.law, ("mpc", "proportional"))
         check_whole(self, horizon=2)
-        check_positive(self, "most", "most_change", "aside", "turned", "change", "reach", "drift", "first_bias", "noise",
-                       "stride_gain", "blind", "clearance", "inside")
+        check_positive(self, "most", "most_change", "aside", "turned", "change", "reach", "drift", "first_bias",
+                       "first_gain", "noise", "stride_gain", "blind", "clearance", "inside")

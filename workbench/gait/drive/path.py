@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_interp_spline
 
 from workbench.files import InputError
 from workbench.types import Array
@@ -17,8 +18,10 @@ FARTHEST = 50.0
 
 
 class WayPath:
-    """From the origin, heading along x, through `points` (x forward, y left) [m] in order; a cubic spline over chord length.
+    """From the origin, heading along x, through `points` (x forward, y left) [m] in order; a quintic spline over chord length.
 
+    Its curvature begins at zero, because the first cycles go straight whatever is decided, and changes without a kink at the
+    way-points, where that of a cubic spline has its peaks.
     InputError where there is none, or two that follow each other are the same.
     """
 
@@ -32,7 +35,9 @@ class WayPath:
         if chords.min() < 1e-3:
             raise InputError(None, f"way-point {int(np.argmin(chords)) + 1} is where the one before it is")
         knots = np.concatenate([[0.0], np.cumsum(chords)])
-        spline = CubicSpline(knots, every, bc_type=((1, np.array([1.0, 0.0])), (2, np.zeros(2))))
+        straight = [(1, np.array([1.0, 0.0])), (2, np.zeros(2))]
+        ends: Any = (straight, [(3, np.zeros(2)), (4, np.zeros(2))])  # the stubs do not know the form with derivatives
+        spline = make_interp_spline(knots, every, k=5, bc_type=ends)
         fine = np.linspace(0.0, knots[-1], max(int(knots[-1] / SPACING), 20))
         self.points = every[1:]
         self.p = np.asarray(spline(fine))

@@ -59,10 +59,12 @@ def plan(left: float, heading: float, before: float, bias: float, targets: Array
     robot beyond the map's [rad per cycle]; targets (N + 1,): heading of the path at each cycle's beginning and after the last
     [rad]; bounds: of the lateral position (N + 1,) each [m]. In errors e = heading - target:
 
-        left(j+1) = left(j) + ahead · e(j) + aside + aside_gain · u(j)
-        e(j+1) = e(j) + bias + gain u(j) + memory u(j-1) - (target(j+1) - target(j))
+        left(j+1) = left(j) + ahead · (e(j) - bend(j)/2) + aside + aside_gain · u(j),  bend(j) = target(j+1) - target(j)
+        e(j+1) = e(j) + bias + gain u(j) + memory u(j-1) - bend(j)
         minimise sum (left/aside weight)² + (e/turned weight)² + (change of u/change weight)² + inside · (way out of bounds)
         within limits on u and its change
+
+    On an arc that the robot follows exactly, the path moves aside by ahead · bend/2 in each cycle, as the robot does.
     """
     N = len(targets) - 1
     program = MathematicalProgram()
@@ -72,7 +74,7 @@ def plan(left: float, heading: float, before: float, bias: float, targets: Array
     own, turning = m.bias + bias, np.diff(targets)
     I, before_u, steps = np.eye(N), np.eye(N, k=-1), np.diff(np.eye(N + 1), axis=0)
     moved = np.hstack([steps, -m.ahead * np.eye(N, N + 1), -m.aside_gain * I])
-    program.AddLinearEqualityConstraint(moved, np.full(N, m.aside), np.concatenate([y, e, u]))
+    program.AddLinearEqualityConstraint(moved, m.aside - m.ahead * turning / 2, np.concatenate([y, e, u]))
     turned = np.hstack([steps, -m.gain * I - m.memory * before_u])
     right = own - turning
     right[0] += m.memory * before
@@ -109,6 +111,8 @@ def _add_bounds(program: MathematicalProgram, y: Array, bounds: tuple[Array, Arr
                                 np.concatenate([y, over]))
 
 
-def with_stride(m: StepMap, ahead: float, aside: float) -> StepMap:
-    """The map of a robot that goes so far ahead and aside in a cycle [m]."""
-    return replace(m, ahead=ahead, aside=aside)
+def of_robot(m: StepMap, ahead: float, aside: float, gain: float) -> StepMap:
+    """The map of a robot that goes so far ahead and aside in a cycle [m], and whose response to a turn exceeds the map's by the
+    share `gain`."""
+    share = 1.0 + gain
+    return replace(m, ahead=ahead, aside=aside, gain=share * m.gain, memory=share * m.memory, aside_gain=share * m.aside_gain)

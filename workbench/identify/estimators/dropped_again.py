@@ -36,7 +36,7 @@ class TakesAsPlayed:
         return with_dropped_commands(self.sent, model, residuals)
 
 
-def reestimated(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Search, TakesAsPlayed]:
+def reestimate(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Search, TakesAsPlayed]:
     """Missed poses as the robot with these effects tells them, and the search on takes that are played without these; the same
     search where they are those that were known."""
     model, sent = with_effects(search.nominal, current.sizes()), played.sent

@@ -124,7 +124,7 @@ def _carried(model: RobotModel, joint: str) -> str:
 
 def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
     tracks = mend(tracks_of(e.take.recording), model)
-    return spans(tracks, seen_joints(tracks, model, e.take.spec.base)[0])
+    return spans(tracks, seen_joints(tracks.assets, model, e.take.spec.base)[0])
 
 
 def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainValue]:

@@ -13,7 +13,7 @@ from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence, channel_gaps, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, running_means
 from workbench.robot import RobotModel
 from workbench.types import Array
 
@@ -73,7 +73,7 @@ def _travel(e: TakeEvidence, column: int, residual: Array, side: int) -> list[_T
     """Of the joint in this column; none where it was hardly seen."""
     seen = e.recorded[:, column]
     said = seen - residual[:, column] * e.sigma[column]
-    mean = smoothed(seen[:, None], 5)[:, 0] / np.sqrt(5) * side
+    mean = running_means(seen[:, None], 5)[:, 0] / np.sqrt(5) * side
     good = np.isfinite(mean) & np.isfinite(said)
     if good.sum() < 20:
         return []

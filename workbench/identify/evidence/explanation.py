@@ -31,12 +31,12 @@ from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
-    from workbench.identify.evidence.fit import Fitted
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
     from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
+    from workbench.identify.evidence.tied_names import TieFits
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
     from workbench.identify.results.tied_names import GravityOverTorque
@@ -50,7 +50,7 @@ class Explanation:
     """The most probable model, with all alternatives (a `workbench.identify.search_result.SearchResult`). found, posteriors: one
     for each region; robot: effects that act on all joints; refuted: effects rejected by registers or by held-out takes; missed:
     commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work was reached;
-    tied_names: by region, each effect fitted that could be the whole change of gravity over torque."""
+    of_tie: by region, fits of each single cause of its gravity over torque."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -62,13 +62,13 @@ class Explanation:
     missed: tuple[DroppedCommands, ...] = ()
     drifts: tuple[Drift, ...] = ()
     stopped: bool = False
-    tied_names: tuple[list[Fitted], ...] = ()
+    of_tie: tuple[TieFits | None, ...] = ()
 
     @property
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """Gravity over torque where it is not as told, with the effects that could be it."""
         said = (gravity_over_torque(region, self.options, p, fits)
-                for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.tied_names))
+                for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.of_tie))
         return tuple(s for s in said if s is not None)
 
     @property
@@ -116,7 +116,7 @@ class Explanation:
                     tuple(others[:1]),
                     c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
                     family=None if family is None else FamilyBelief(family, share * p.families[family]))
-                out.append(shared_by_tie(finding, ties.get(region.joints), self.options))
+                out.append(shared_by_tie(finding, ties.get(region.joints)))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
     def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:

@@ -37,9 +37,9 @@ class Ratio:
         between_days = (options.drift or SinceThen()).torque
         return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
 
-    def estimate(self) -> Estimate:
-        """With its 90 % interval."""
-        half = CONCLUSIONS.z90 * CONCLUSIONS.wider * self.sd
+    def estimate(self, options: EvidenceOptions) -> Estimate:
+        """With its 90 % interval, as much wider than the fit claims as any number of a servo's law (`EvidenceOptions.formal`)."""
+        half = CONCLUSIONS.z90 * options.formal * self.sd
         return Estimate(math.exp(self.log), math.exp(self.log - half), math.exp(self.log + half), "1")
 
 
@@ -60,35 +60,54 @@ def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | Non
     return Ratio(log, math.sqrt(max(0.0, float(slope @ f.covariance(region, options) @ slope))))
 
 
-def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Fitted]]:
-    """Fits of each effect of the tie alone, with the servo's torques at their nominal values but for their variation between
-    days; the likeliest first. Empty where gravity over torque is nominal."""
+@dataclass(frozen=True)
+class TieFits:
+    """Fits that each explain a ratio of gravity to torque by one cause. torque: by the servo's torques alone; names: by one
+    effect and nominal torques, the likeliest first."""
+
+    torque: Fitted
+    names: tuple[Fitted, ...]
+
+    def behind(self, f: Fitted) -> float:
+        """How much less likely a fit is than the likeliest [nats]."""
+        return max(g.log_evidence for g in (self.torque, *self.names)) - f.log_evidence
+
+
+def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[TieFits | None]:
+    """Fits of the servo's torques alone, and of each effect of the tie alone, with the servo's torques at their nominal values
+    but for their variation between days. None where gravity over torque is nominal."""
     ratio = ratio_of(region, options, f)
     members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
     if ratio is None or not members or not ratio.is_apart(options):
-        return []
+        return None
     told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
     rest = [(c, x) for c, x in f.hypothesis.sizes() if c.effect.tied != GRAVITY]
+    torque = f
+    if len(rest) < len(f.hypothesis.effects):
+        alone = Hypothesis(region.numbers, tuple(c for c, _ in rest), np.concatenate([f.hypothesis.z, *(x for _, x in rest)]))
+        torque = yield from fitting(region, options, alone, f.discrepancy, options.iterations)
+        torque = yield from polished(region, options, torque)
     without = Hypothesis(told.numbers, tuple(c for c, _ in rest), np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)]))
     bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
     moves = yield from linearised(told, options, bare)
     fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
     fits = yield from side_by_side([polished(told, options, g) for g in fits])
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
-    return sorted(within, key=lambda g: -g.log_evidence)
+    return TieFits(torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
 
 
-def shared_by_tie(f: Finding, told: GravityOverTorque | None, options: EvidenceOptions) -> Finding:
-    """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with the tie's
-    probability shared among all of them."""
+def shared_by_tie(f: Finding, told: GravityOverTorque | None) -> Finding:
+    """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with its share
+    of the tie's probability, which is divided equally among all of these."""
     if told is None:
         return f
-    near = [n for n in told.names if n.behind < options.occam]
+    near = told.competitive
     others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
     if not others or len(others) == len(near):
         return f
     each = min(f.confidence, told.confidence / len(near))
-    return replace(f, confidence=each, alternatives=(Alternative(others[0].effect, others[0].where, each),))
+    rival = Alternative(others[0].effect, others[0].where, each)
+    return replace(f, confidence=each, of_tie=told.confidence, alternatives=(rival,))
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:
@@ -100,22 +119,22 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
     return [replace(n, sd=min(n.sd, drift.of(n.name))) if n.name in TORQUES else n for n in numbers]
 
 
-def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: Sequence[Fitted]
+def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None
                         ) -> GravityOverTorque | None:
-    """The tie as it is reported; None where gravity over torque is nominal. fits: of `names_of_tie`."""
+    """The tie as it is reported; None where gravity over torque is nominal. fits: of `fits_of_tie`."""
     ratio = ratio_of(region, options, p.best)
-    if ratio is None or not fits:
+    if ratio is None or fits is None or not fits.names:
         return None
     names = []
-    for g in fits:
+    for g in fits.names:
         c, x = g.hypothesis.sizes()[-1]
         own, tie = g.hypothesis.slices()[-1], as_torque(region, options, g, c)
         formal = g.covariance(region, options)[own, own]
         covariance = formal if tie is None else tie.covariance(formal, x)
         names.append(TiedName(c.name, c.where, estimates(c, x, covariance), c.effect.sentence(c.spec(x)),
-                              fits[0].log_evidence - g.log_evidence))
+                              fits.behind(g)))
     ties = [as_torque(region, options, p.best, c) for c in p.best.hypothesis.effects]
     share = min((t.share for t in ties if t is not None), default=1.0)
     there = sum(w for f, w in p.weights if any(c.effect.tied == GRAVITY for c in f.hypothesis.effects))
-    return GravityOverTorque(region.joints, ratio.estimate(), min(1.0, CONCLUSIONS.surest * share * there), tuple(names),
-                             options.drift is not None)
+    return GravityOverTorque(region.joints, ratio.estimate(options), min(1.0, CONCLUSIONS.surest * share * there),
+                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque))

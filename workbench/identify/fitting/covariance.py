@@ -19,13 +19,13 @@ def covariance_of(
     """Of a block's numbers; joint: whose channels identify them, None for all; bent: whether contact bends what floating-base
     takes identify. Infinite where nothing depends on a number."""
     stretches = evaluator.stretches(takes, "fit", joint)
-    engines = bent * FIT.contact_error * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
+    engines = bent * FIT.contact_error * np.abs(solved.x) * _floating_share(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)
     temper = FIT.overdispersion_free if bent and evaluator.any_floating(takes) else 1.0
-    return np.asarray(clustered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
+    return np.asarray(cluster_covariance(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 
-def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
+def _floating_share(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
     """Share of the information on each parameter that comes from floating-base takes."""
     free = [i for i in takes if evaluator.any_floating((i,))]
     information = np.sum(solved.J**2, axis=0)
@@ -41,7 +41,7 @@ def _bent_by_contact(evaluator: RolloutEvaluator, solved: Solved, takes: Sequenc
     return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
 
-def clustered(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
+def cluster_covariance(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
     """Covariance of a block's sizes: from the scatter between stretches, since errors of neighbouring frames and joints are
     correlated (clustered sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), and at least that from the scatter between
     frames and from chi squared over temper; infinite where nothing depends on them."""

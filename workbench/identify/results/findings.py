@@ -98,7 +98,9 @@ class Finding:
     """One effect that the nominal model lacks. where: joints, links, feet or rigid bodies; empty: the whole robot. confidence:
     probability (0 to 1) that it is there. parameters: estimates by name, each with its unit. fit: error on the frames that were
     fitted; validation: on those that neither selection nor parameters saw. alternatives: at most one, which the data cannot
-    separate from it. evidence: the same in words. family: probability of any effect of its family."""
+    separate from it. evidence: the same in words. family: probability of any effect of its family. of_tie: where the finding is
+    one of several names of a ratio in `Diagnosis.tied`, the probability that one of these is there; confidence is then this
+    name's share of it."""
 
     effect: str
     where: tuple[str, ...]
@@ -109,15 +111,20 @@ class Finding:
     alternatives: tuple[Alternative, ...] = ()
     evidence: str = ""
     family: FamilyBelief | None = None
+    of_tie: float | None = None
 
     def __post_init__(self) -> None:
         _check_confidence(self.confidence)
+        if self.of_tie is not None:
+            _check_confidence(self.of_tie)
         if len(self.alternatives) > 1:
             raise ValueError(f"a tie is one finding with at most one alternative, got {len(self.alternatives)}")
 
     @property
     def tie(self) -> Alternative | None:
         """The other name of a tie of two."""
+        if self.of_tie is not None:
+            return None
         return next((a for a in self.alternatives if a.confidence >= CONCLUSIONS.tied * self.confidence), None)
 
     @property
@@ -127,12 +134,13 @@ class Finding:
 
     @property
     def likely(self) -> bool:
-        """Whether the effect, or its alternative, is more likely there than not."""
-        return self.confidence + sum(a.confidence for a in self.alternatives) >= CONCLUSIONS.likely
+        """Whether the effect, or its alternative, or one of the names of its tie, is more likely there than not."""
+        return max(self.of_tie or 0.0, self.confidence + sum(a.confidence for a in self.alternatives)) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
+                **({} if self.of_tie is None else {"of_tie": _number(self.of_tie)}),
                 **({} if self.family is None else {"family": self.family.to_json()}),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()},
                 "alternatives": [a.to_json() for a in self.alternatives],
@@ -150,7 +158,7 @@ class Rejected:
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
-        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.said()}
+        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.in_words()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
 
@@ -192,7 +200,7 @@ class Unexplained:
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
-                "description": self.description.said()}
+                "description": self.description.in_words()}
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,11 @@ class Statement(ABC):
     """Something that is said in findings.json and in the report."""
 
     @abstractmethod
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """In words, without a full stop."""
 
     def __str__(self) -> str:
-        return self.said()
+        return self.in_words()
 
 
 class Reason(Statement):
@@ -52,7 +52,7 @@ class WorseInPlace(Reason):
     where: tuple[str, ...]
     behind: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         more = f"{self.behind:.0f} more" if self.behind >= 0 else f"only {-self.behind:.0f} less"
         return f"in place of {naming(self.effect, self.where)} it leaves {more} of chi squared on stretches that no fit saw"
@@ -66,7 +66,7 @@ class ScreenedOut(Reason):
     gain: float
     best: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         takes = f"reduces chi squared by {self.gain:.0f} at most" if self.gain >= 1 else "does not reduce chi squared"
         return f"its response does not match the residuals: it {takes}, the best rival's reduces it by {self.best:.0f}"
@@ -76,7 +76,7 @@ class ScreenedOut(Reason):
 class TooLittle(Reason):
     """Nothing was accepted at this joint or link."""
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return "it reduces the error no more than chance would, or by too little of the excess there"
 
@@ -91,7 +91,7 @@ class Outdone(Reason):
     taken: float
     gain: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return (f"{naming(self.effect, self.where)} reduces chi squared on the choosing stretches by {self.taken:.0f}, this one "
                 f"by {self.gain:.0f}")
@@ -103,7 +103,7 @@ class LessLikely(Reason):
 
     behind: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return f"the best model containing it is {_times(self.behind)} less probable"
 
@@ -114,7 +114,7 @@ class SpokenAgainst(Reason):
 
     by: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return f"the held-out takes are {_times(self.by)} less probable with it"
 
@@ -128,7 +128,7 @@ class RefutedByRegister(Reason):
     error: float
     unit: str
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return f"the servos' own registers give {self.parameter} {self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
 
@@ -141,7 +141,7 @@ class AtItsEnd(Reason):
     value: float
     unit: str
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         value = f"{self.value:.3g}{_behind_number(self.unit)}"
         return f"its {self.parameter} would have to be {value} or beyond, which is not plausible on this robot"
@@ -174,7 +174,7 @@ class Dependence(Description):
     correlation: float = 0.0
     worst: str = ""
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         what = (f"{self.channel}, " if self.channel in BODY else
                 f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
@@ -194,7 +194,7 @@ class ParameterDrift(Description):
     last: float
     unit: str
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return (f"{self.parameter} of {naming(self.effect, self.where)} would have to go from {self.first:.3g} to "
                 f"{self.last:.3g} {self.unit} within a take: something that changes looks like it")
@@ -207,7 +207,7 @@ class DownwardPull(Description):
     effect: str
     mass: float
 
-    def said(self, naming: Naming = effect_at) -> str:
+    def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return (f"the {self.effect.replace('_', ' ')} is a pull straight down, with the weight of {1e3 * self.mass:.0f} g that "
                 "does not resist being moved as a load does: something that hangs and swings looks like it")

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from workbench.identify.results.findings import Estimate
 
-COMPETITIVE = 7.0
-"""A name this far behind the best of its tie is not mentioned in the sentence [nats]: a thousand times less probable, the same
-window in which models count (`EvidenceOptions.occam`). The table lists all."""
-
 
 @dataclass(frozen=True)
 class TiedName:
     """One effect that alone would explain the ratio. sentence: for a person, with its size; behind [nats]: how much less likely
-    the recordings are with it than with the best effect of the tie."""
+    the recordings are with it than with the likeliest cause."""
 
     effect: str
     where: tuple[str, ...]
@@ -33,27 +30,49 @@ class TiedName:
 @dataclass(frozen=True)
 class GravityOverTorque:
     """Gravity over torque of the joints `where`, relative to the robot's files. confidence: probability that one of the effects
-    is present, rather than a change of the servo's torques alone; since: whether the files are those of an earlier diagnosis."""
+    is present, rather than a change of the servo's torques alone; since: whether the files are those of an earlier diagnosis;
+    window [nats]: causes this far behind the likeliest are no longer competitive (`EvidenceOptions.occam`); torque_behind [nats]:
+    how much less likely other torques of the servo are than the likeliest cause."""
 
     where: tuple[str, ...]
     ratio: Estimate
     confidence: float
     names: tuple[TiedName, ...]
     since: bool
+    window: float = math.inf
+    torque_behind: float = 0.0
 
-    def said(self) -> str:
-        """For a person: the ratio, everything that it may come from, and how to find out."""
+    @property
+    def competitive(self) -> tuple[TiedName, ...]:
+        """The names that the recordings leave possible."""
+        return tuple(n for n in self.names if n.behind < self.window)
+
+    @property
+    def change(self) -> str:
+        """The ratio in a sentence."""
         low, high = self.ratio.low, self.ratio.high
-        told = f"Gravity over torque in {', '.join(self.where)} is {self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times " \
-               f"{'that of the earlier model' if self.since else 'that of the files'}"
-        each = [f"all torques of the servo times {1 / float(self.ratio.value):.2f}",  # type: ignore[arg-type]
-                *(f"{n.sentence.rstrip('.')} ({n.behind:.0f} nats behind)" if n.behind >= 1 else n.sentence.rstrip('.')
-                  for n in self.names if n.behind <= COMPETITIVE)]
+        return (f"Gravity over torque in {', '.join(self.where)} is {self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times "
+                f"that of the {'earlier model' if self.since else 'files'}.")
+
+    @property
+    def may_be_torque(self) -> bool:
+        """Whether other torques of the servo are a possible cause."""
+        return self.torque_behind < self.window
+
+    def in_words(self) -> str:
+        """For a person: the ratio, everything that it may come from, and how to find out."""
+        torque = f"all torques of the servo times {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
+        causes = [(torque, self.torque_behind)] if self.may_be_torque else []
+        causes += [(n.sentence.rstrip("."), n.behind) for n in self.competitive]
+        each = [f"{said} ({behind:.0f} nats behind)" if behind >= 1 else said for said, behind in causes]
+        if len(each) == 1:
+            return f"{self.change} Of its possible causes the recordings leave one: {each[0]}."
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
-        return (f"{told}. Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known weight "
-                f"on the link in some takes (`load:`){more}.")
+        return (f"{self.change} Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known "
+                f"weight on the link in some takes (`load:`){more}.")
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
-                "confidence": float(self.confidence), "names": [n.to_json() for n in self.names], "evidence": self.said()}
+                "confidence": float(self.confidence), "torque_behind": round(self.torque_behind, 1),
+                "names": [n.to_json() for n in self.names], "evidence": self.in_words()}

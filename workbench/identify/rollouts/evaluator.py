@@ -16,6 +16,7 @@ from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps
+from workbench.identify.rollouts.captured import Rollout, channels_stream
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
 from workbench.identify.rollouts.servo_logs import block_angles, frames, is_log, question_angles
@@ -23,7 +24,7 @@ from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
-from workbench.simulation.batch import Job, simulate_batch, simulate_stream
+from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.cluster import in_blocks, on_cluster
 from workbench.types import Array
 
@@ -81,17 +82,19 @@ class RolloutEvaluator:
                     new[key] = (q, i, felt[i])
         # the longest first, so that no core waits at the end
         order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
-        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), self._until(i, q))
-                for q, i, model in (new[k] for k in order)]
-        for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
+        rollouts = [self._rollout(*new[key]) for key in order]
+        for key, channels in zip(order, channels_stream(rollouts, self.n_jobs)):
             q, i, _ = new[key]
-            e = self.evidence[i]
-            seen = np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan)
+            seen = np.where(self.evidence[i].since[:, None] <= self._until(i, q), channels, np.nan)
             kept = seen.astype(np.float32)  # there are a thousand; noise is a ten thousandth
             self.memory.keep(key, kept)
             answers[key] = kept.astype(float)
         return [{i: self.evidence[i].residual(answers[key], q.model, corrected and q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
+
+    def _rollout(self, q: RolloutRequest, take: int, felt: RobotModel) -> Rollout:
+        config = replace(self.config, time_step=self.config.time_step * q.step)
+        return Rollout(self.evidence[take], q.model, self.job(felt, take, config, self._until(take, q)))
 
     def uncorrected(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """As `residuals`, whatever their step is wrong by. Servo logs are not shifted, as their start is known, and come straight

@@ -19,7 +19,7 @@ from workbench.identify.selection.options import CALIBRATION, COMPARISON, SCHEDU
 from workbench.types import Array
 
 
-def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
+def calibrate(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[NamePosterior]:
     """Lowers each probability by a factor for: large residuals at the effect's joint or link on the fixed-base takes that
     identified it, or parameters that these would change (for an effect on every joint, at joints without an effect of their own);

@@ -24,11 +24,11 @@ from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.search_result import Problem
 from workbench.identify.selection.acceptance import idle, too_little_left
-from workbench.identify.selection.calibration import calibrated
+from workbench.identify.selection.calibration import calibrate
 from workbench.identify.selection.forward import select
 from workbench.identify.selection.model_comparison import NamePosterior, compare_models
 from workbench.identify.selection.record import SelectionResult
-from workbench.identify.subset import data_subset, floors_everywhere, rebalanced
+from workbench.identify.subset import data_subset, floors_everywhere, rebalance
 from workbench.robot import Posterior, RobotModel
 from workbench.types import Progress
 
@@ -128,12 +128,12 @@ def explained_by_selection(problem: Problem) -> Selected:
     """Searches which effects explain the takes, compares them with their rivals and refines their numbers."""
     evaluator, progress = problem.evaluator, problem.progress
     residuals = dict(problem.residuals)
-    looked_at = tuple(data_subset(rebalanced(evaluator.evidence, residuals), residuals))
+    looked_at = tuple(data_subset(rebalance(evaluator.evidence, residuals), residuals))
     chosen = select(Search(evaluator.on(looked_at), problem.nominal), problem.pool, progress, problem.thorough, problem.played)
     search, fit, posteriors = compare_models(chosen.search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
-    sure = calibrated(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
+    sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
     return Selected(problem.nominal, looked_at, chosen, search, fit, sure, floors, changing)

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
+from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimate
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
@@ -28,9 +28,9 @@ from workbench.identify.selection.left_to_chance import left_to_chance
 from workbench.identify.selection.options import ACCEPTANCE, FORWARD, SCHEDULING, SUBSETS
 from workbench.identify.selection.pair_move import with_pair
 from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
-from workbench.identify.selection.reevaluation import reevaluated
+from workbench.identify.selection.reevaluation import reevaluate
 from workbench.identify.selection.scheduling import groups_to_try, standing_out
-from workbench.identify.selection.screening import tried
+from workbench.identify.selection.screening import fit_groups
 from workbench.identify.selection.swap import best_sets
 from workbench.types import Progress
 
@@ -39,7 +39,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
            played: TakesAsPlayed | None = None) -> SelectionResult:
     """The accepted effects. thorough: without a limit of work; else, once it is reached, the trials so far decide. played: the
     takes without commands that never arrived, read again with the effects identified on fixed-base takes."""
-    current = nominal = search.evaluated([])
+    current = nominal = search.evaluate([])
     rounds: list[SelectionStep] = []
     most = np.inf if thorough else max(FORWARD.most_work, FORWARD.most_rollouts * search.evaluator.seconds)
     if search.fixed_base:
@@ -47,14 +47,14 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
     if current.effects and played is not None:
         report("looking again", None)
         begun = search
-        search, played = reestimated(search, current, played)
+        search, played = reestimate(search, current, played)
         if search is not begun:
-            rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
-            there = search.evaluated(current.sizes())
-            current = search.refitted(there, search.fixed_base or search.fitted, FORWARD.replayed_steps)
-        nominal = search.evaluated([])
+            rounds = [replace(r, before=search.evaluate(r.before.sizes())) for r in rounds]
+            there = search.evaluate(current.sizes())
+            current = search.refit(there, search.fixed_base or search.fitted, FORWARD.replayed_steps)
+        nominal = search.evaluate([])
     if search.fixed_base != search.fitted:
-        current = search.with_timing_refitted(current)
+        current = search.refit_timing(current)
         search = search.with_settled(current)
         closed = least_closed(search, nominal, current)
         search, current, rounds = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
@@ -64,9 +64,9 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
         report("fitting together", None)
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
-            search, kept = search.resettled(kept)
+            search, kept = search.resettle(kept)
         if kept is not current or _may_go_on(search, kept):
-            kept = search.refitted(kept, search.fitted, FORWARD.last_steps)
+            kept = search.refit(kept, search.fitted, FORWARD.last_steps)
     return SelectionResult(search, kept, tuple(rounds), played.missed if played else ())
 
 
@@ -97,7 +97,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
                 break
             groups, on = groups_to_try(search, likely, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
-            trials += tried(search, current, groups, on, say, ahead, least)
+            trials += fit_groups(search, current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
             said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
@@ -107,7 +107,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
                     break
                 likely = [c for c in pool if c.effect.moves_center]
         worth = [t for t in trials if t.closed > closed and is_acceptable(search, t, takes, rounds, current)]
-        choices = _accepted(worth)
+        choices = _accept(worth)
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, SUBSETS.most_steps) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: penalised_cost(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
@@ -127,9 +127,9 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         if search.evaluator.any_floating(takes):
             search, current = checked_on_fixed_base(search, current, [t.candidate for t in accepted])
         else:
-            current, rounds = reevaluated(search, current, rounds, takes)
+            current, rounds = reevaluate(search, current, rounds, takes)
     if search.evaluator.any_floating(takes):
-        current, rounds = reevaluated(search, current, rounds, takes)
+        current, rounds = reevaluate(search, current, rounds, takes)
     return search, current, rounds
 
 
@@ -169,7 +169,7 @@ def _closed_at(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, 
     return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
 
 
-def _accepted(worth: Sequence[CandidateFit]) -> list[list[CandidateFit]]:
+def _accept(worth: Sequence[CandidateFit]) -> list[list[CandidateFit]]:
     """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
     robot's the best, but not what leaves half where another closes nearly all. Where the screening does not show which is ahead,
     each of them to be fitted."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.fitting.fits import Search, gained
+from workbench.identify.fitting.fits import Search, gain_between
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.candidate_fit import CandidateFit
@@ -85,7 +85,7 @@ def better_on_fixed_base(search: Search, fit: Fit, rival: Fit) -> float:
 
 def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
     """How much less chi squared a rival leaves on these takes."""
-    return gained(search.evaluator, fit, rival, takes, "choose")
+    return gain_between(search.evaluator, fit, rival, takes, "choose")
 
 
 def numbers_identified(fit: Fit, i: int) -> int:

@@ -18,7 +18,7 @@ from workbench.identify.selection.options import RECORD, REEVALUATION, SUBSETS
 from workbench.identify.selection.record import SelectionStep, judged_by_all
 
 
-def reevaluated(
+def reevaluate(
     search: Search, current: Fit, rounds: Sequence[SelectionStep], takes: tuple[int, ...]
 ) -> tuple[Fit, list[SelectionStep]]:
     """The fit and its rounds, such effects replaced where a rival leaves less on these takes, beside all that came since; rivals'
@@ -27,18 +27,18 @@ def reevaluated(
     for n, r in enumerate(rounds):
         for t in r.accepted if any(later.accepted for later in rounds[n + 1:]) else ():
             if _weighable(search, t) and t.closed < RECORD.complete and t.candidate.key in current.sizes_by_key():
-                current, out[n] = _reevaluated(search, current, out[n], t, takes)
+                current, out[n] = _reevaluate(search, current, out[n], t, takes)
     return current, out
 
 
-def _reevaluated(
+def _reevaluate(
     search: Search, current: Fit, r: SelectionStep, t: CandidateFit, takes: tuple[int, ...]
 ) -> tuple[Fit, SelectionStep]:
     rivals = [o for o in r.trials if _weighable(search, o) and o.candidate.key not in current.sizes_by_key()
               and o.gain["choose"] > REEVALUATION.near * t.gain["choose"]][:REEVALUATION.most]
     if not rivals:
         return current, r
-    rest = search.evaluated(current.sizes_without(t.candidate.key))
+    rest = search.evaluate(current.sizes_without(t.candidate.key))
     fits = search.side_by_side([fitted_beside(search, rest, [o], takes, SUBSETS.most_steps) for o in rivals])
 
     def left(fit: Fit) -> dict[str, float]:

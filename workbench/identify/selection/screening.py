@@ -20,7 +20,7 @@ from workbench.types import Array
 Asking = Part[list[CandidateFit]]
 
 
-def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
+def fit_groups(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
           report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
     """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is fixed, one effect
     at several joints, each judged by its own joint's channels. takes: on which, by group.
@@ -96,7 +96,7 @@ class CandidateEvaluation:
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
         """Sizes and gains as responses of an earlier screening predict them, where that is hopeless; None: to be looked at."""
         known = self.responses.get(self._name) if self.walking else None
-        guesses = None if known is None else self._guessed(*known)
+        guesses = None if known is None else self._initial_sizes(*known)
         if guesses is not None:
             note_best(self.race.remembered, self.joints, guesses[1])
         yield []  # until all have said what they remember
@@ -113,7 +113,7 @@ class CandidateEvaluation:
         before = self._vectors_by_joint(plain)
         responses = [[v - w for v, w in zip(self._vectors_by_joint(a), before)] for a in answers]
         self.responses[self._name] = probes, responses
-        guess = self._guessed(probes, responses)
+        guess = self._initial_sizes(probes, responses)
         calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
         if calm is None:
             return guess
@@ -150,7 +150,7 @@ class CandidateEvaluation:
                 best, most = (i, x), share
         return best
 
-    def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
+    def _initial_sizes(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
         """Initial sizes and their predicted gain, on all takes and on those that were simulated."""
         looked_at = {i: self.base[i] for i in self.looked_at}
         r0 = self._vectors_by_joint(looked_at)
@@ -183,17 +183,17 @@ class CandidateEvaluation:
         self.without, answer = yield [self._question([], []), self._question(alive, starts)]
         first = self._vectors_by_joint(self._fine_residuals(answer))
 
-        def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
+        def improve(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
             return (yield from through(self._stepping(start, leaves, alive, n, since), lambda p: self._question(alive, p),
                                        lambda answer: [self._vectors_by_joint(self._fine_residuals(answer))[b] for b in alive]))
 
-        solved = yield from improved(starts, [first[b] for b in alive], 1)
+        solved = yield from improve(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
         note_best(self.race.reached, [self.joints[b] for b in alive], gains)
         yield []  # until all have come as far
         ahead = [g > SCREENING.behind * best_at(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)]
         if iterations > 1 and any(ahead):
-            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
+            solved = yield from improve([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
 
     def _stepping(self, start: list[Array], leaves: list[Array], which: Sequence[int], n: int, since: Sequence[Solved] = ()

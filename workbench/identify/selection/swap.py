@@ -68,13 +68,13 @@ def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> b
     return bool(left.sum() < SUBSETS.right * expected.sum())
 
 
-def _fit_sets(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...],
-            ahead: int = SUBSETS.ahead) -> list[tuple[Fit, list[CandidateFit]]]:
+def _fit_sets(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...]
+              ) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
     begun = search.side_by_side([fitted_beside(search, current, chosen, takes, SUBSETS.most_steps) for chosen in sets])
     ranked = sorted(zip(begun, sets), key=lambda f: penalised_cost(f[0]))
-    ended = search.side_by_side([search.refitting(fit, takes, SUBSETS.together_steps) for fit, _ in ranked[:ahead]])
-    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[ahead:]], key=lambda f: penalised_cost(f[0]))
+    ended = search.side_by_side([search.refitting(fit, takes, SUBSETS.together_steps) for fit, _ in ranked[:SUBSETS.ahead]])
+    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[SUBSETS.ahead:]], key=lambda f: penalised_cost(f[0]))
 
 
 def exchanges(

@@ -11,6 +11,7 @@ from workbench.files import InputError
 from workbench.files.kinds import kind_of_file, lfs_pointer
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary
+from workbench.recording.formats.odd_tables import odd_table
 from workbench.recording.formats.registry import known_formats
 from workbench.recording.formats.table_header import table_header
 
@@ -57,6 +58,8 @@ def refusal(path: Path, head: bytes) -> InputError:
         return InputError(path, pointer)
     if (kind := kind_of_file(head, path.suffix)) is not None:
         return InputError(path, f"{kind} (expected a recording: {wanted})")
+    if (odd := odd_table(head)) is not None:
+        return InputError(path, odd)
     if is_binary(head):
         return InputError(path, f"a binary file of no known kind; expected a recording ({wanted})")
     header = table_header(head)

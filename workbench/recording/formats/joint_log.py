@@ -14,7 +14,7 @@ from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.tables import is_binary
 from workbench.recording.formats.log_commands import commands_of_rows, order_problem
-from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
+from workbench.recording.formats.numbers import Bytes, column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.formats.table_header import table_header
 from workbench.recording.recording import Recording
@@ -51,6 +51,7 @@ def read_joint_log(path: str | Path) -> Recording:
         raise InputError(source, f"line {problem.row + header.lines + 1}: {problem.text}")
     channels = {name: _channel(source, table, i, name, header.lines) for i, name in enumerate(names)
                 if name != "time" and i in wanted}
+    problems = _cut_number(content, len(time) + header.lines)
     joints = tuple(n.removeprefix("goal.") for n in names if n.startswith("goal."))
     goals = np.column_stack([channels[f"goal.{j}"] for j in joints])
     on = np.ones(len(time))
@@ -60,12 +61,18 @@ def read_joint_log(path: str | Path) -> Recording:
     speeds = np.column_stack([np.nan_to_num(channels.get(f"speed.{j}", at_once)) for j in joints])
     return Recording(source=source, kind="joint_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
                      units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial, speeds),
-                     metadata={"written with": written} if written else {})
+                     metadata={"written with": written} if written else {}, problems=problems)
 
 
 def _check_names(source: str, names: list[str], line: int) -> None:
     for i, name in enumerate(names):
         kind, dot, joint = name.partition(".")
+        if not name:
+            raise InputError(source, f"line {line}: column {i + 1} has no name: a comma at the end of the line? Delete it in "
+                                     "each row")
+        if name[-2:] in (".1", ".2") and name[:-2] in names:
+            raise InputError(source, f"line {line}: column '{name}': '{name[:-2]}' was there twice when pandas read it; keep "
+                                     "one")
         if name in names[:i]:
             raise InputError(source, f"line {line}: column '{name}' is given twice")
         if name not in ("time", "voltage") and not (dot and joint and kind in _SCALE):
@@ -75,6 +82,18 @@ def _check_names(source: str, names: list[str], line: int) -> None:
             raise InputError(source, f"line {line}: column '{name}' without 'goal.{joint}'")
     if "time" not in names or not any(n.startswith("goal.") for n in names):
         raise InputError(source, f"line {line}: expected a column 'time' and goals of joints")
+
+
+def _cut_number(content: Bytes, line: int) -> tuple[str, ...]:
+    """A line where the file ends within its last number: no line end, and fewer decimals than in all rows above."""
+    tail = bytes(content[-20_000:]).decode("utf-8", "replace").split("\n")
+    if len(tail) < 12 or not tail[-1].strip():
+        return ()
+    decimals = [len(row.rstrip("\r").rpartition(",")[2].partition(".")[2]) for row in tail[1:]]
+    if decimals[-1] < min(decimals[:-1]):
+        return (f"line {line}: the last number has fewer decimals than those above and no line end follows: the file was cut "
+                "there; delete the last row",)
+    return ()
 
 
 def _channel(source: str, table: pa.Table, index: int, name: str, above: int) -> Array:

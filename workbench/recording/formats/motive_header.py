@@ -39,7 +39,6 @@ class MotiveHeader:
     assets: tuple[Asset, ...]
     timecode: int | None
     parents: Mapping[str, str]
-    delimited_rows: tuple[tuple[str, ...], ...]
 
     @property
     def version(self) -> str:
@@ -128,8 +127,7 @@ def _header(source: str, rows: list[list[str]], offset: int) -> MotiveHeader:
             parents[name] = cell(labelled["Parent"], i)
     for asset in assets.values():
         _check(source, asset)
-    return MotiveHeader(metadata, len(axes), offset, len(rows), tuple(assets.values()), timecode, parents,
-                        tuple(tuple(r) for r in rows))
+    return MotiveHeader(metadata, len(axes), offset, len(rows), tuple(assets.values()), timecode, parents)
 
 
 def _check(source: str, asset: Asset) -> None:

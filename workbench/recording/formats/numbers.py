@@ -25,7 +25,8 @@ _BLOCK = 1 << 22
 """Bytes that are read at once; less is sooner read by one thread than given to several."""
 _CLOCK = re.compile(r"\d{4}-\d\d-\d\d|\d\d?:\d\d")
 """How dates and times of day are written."""
-_BLANK = ["", " ", "NaN", "nan"]
+_BLANK = ["", " ", "NaN", "nan", "NA", "N/A", "#N/A", "null", "NULL", "None"]
+"""How a missing value is written, by spreadsheets, R, pandas, JSON and Python among others."""
 
 
 def map_file(path: str | Path) -> mmap.mmap:
@@ -96,14 +97,41 @@ def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: i
         if not any(row):
             continue
         if len(row) != width:
-            cut = "; the file is cut mid-row" if last and len(row) < width else ""
-            return InputError(source, f"line {n}: {len(row)} of {width} columns{cut}")
+            return InputError(source, f"line {n}: {len(row)} of {width} columns{_why_width(row, width, last)}")
         for i, cell in enumerate(row):
             if i not in text and cell not in _BLANK and number_of(cell) is None:
                 told = MistypedError if cell.strip().isalpha() else InputError
-                how = " (a date or time of day: write seconds since the first row)" if _CLOCK.search(cell) else ""
-                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'{how}")
+                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'{_why_word(row, cell)}")
     return None
+
+
+def _why_width(row: list[str], width: int, last: bool) -> str:
+    """The likely cause of a row that is not as wide as the header, and the remedy."""
+    if len(row) == 1:
+        return f" ('{row[0][:40]}': text among the rows; delete the line)"
+    if len(row) == width + 1 and not row[-1]:
+        return " (a comma at the end of the row: delete it)"
+    if len(row) in (2 * width, 2 * width - 1, 2 * width - 2, 2 * width - 3) or len(row) > 1.5 * width:
+        return " (decimal commas between commas? Write decimal points, or ; between the columns)"
+    return "; the file is cut mid-row" if last and len(row) < width else ""
+
+
+def _why_word(row: list[str], cell: str) -> str:
+    """The likely cause of a cell that is no number, and the remedy; empty where nothing tells."""
+    if len(row) > 1 and all(re.match(r"[\[(]?[A-Za-z_%°]", c) for c in row):
+        units = all(len(c.strip("[]()")) <= 6 for c in row)
+        return " (a row of units: delete the line)" if units else " (a second header: two logs in one file? Delete it or split)"
+    hints = ((_CLOCK, "a date or time of day: write seconds since the first row"),
+             (re.compile(r"[\u2010-\u2015\u2212]"), "a dash that is no minus sign: write -"),
+             (re.compile(r"[-+]?\d+,\d+"), "a decimal comma: write a decimal point"),
+             (re.compile(r"[-+]?\d{1,3}([,'\u2019\u00a0 ]\d{3})+([.,]\d*)?"), "write it without separators of thousands"),
+             (re.compile(r"(?i)[-+]?\d*\.?\d+d[-+]?\d+"), "Fortran's exponent: write E"),
+             (re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?\s*[^\d\s.,'-]+"), "a number with its unit: write the number alone"),
+             (re.compile(r"[-?*.x]+|(?i:[-+]?inf(inity)?|missing|error|invalid|timeout)"),
+              "leave the cell blank where nothing was measured"))
+    return next((f" ({text})" for pattern, text in hints
+                 if (pattern.search(cell) if pattern is _CLOCK else pattern.match(cell) if "dash" in text
+                     else pattern.fullmatch(cell.strip()))), "")
 
 
 def column(table: pa.Table, index: int) -> Array:

@@ -27,7 +27,7 @@ class Angles:
 def joint_angles(tracks: Tracks, model: RobotModel, yaw: float, base: str) -> Angles:
     """Each joint's angle is the twist about its axis of the child body's rotation relative to the parent's (thesis, 5.4 and
     6.7); the remainder, the swing across the axis, is `off_axis`, turned from the capture's axes into the base's."""
-    joints, problems = seen_joints(tracks, model, base)
+    joints, problems = seen_joints(tracks.assets, model, base)
     n = len(tracks.time)
     q, off, reach = np.full((n, len(joints)), np.nan), np.full((n, len(joints), 3), np.nan), np.zeros((n, len(joints)))
     for c, joint in enumerate(joints):

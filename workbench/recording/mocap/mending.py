@@ -24,17 +24,17 @@ _SPIKE = 0.06
 _ARM = 0.1  # [m] a rotation weighs as much as the way of a point this far off
 
 
-def mend(tracks: Tracks, model: RobotModel | None = None, longest: float = LONGEST_MENDED) -> Tracks:
+def mend(tracks: Tracks, model: RobotModel | None = None) -> Tracks:
     """Poses that were not seen blanked, lengths and axes corrected, sign flips undone, exchanged labels restored, lone spikes
-    removed, gaps up to `longest` [s] filled (positions linearly, rotations by slerp). Everything is reported in `problems`;
+    removed, gaps up to LONGEST_MENDED filled (positions linearly, rotations by slerp). Everything is reported in `problems`;
     `model` allows lengths, axes and exchanged labels to be judged by the robot's tree."""
     tracks = without_unseen(tracks)
     if model is not None:
         tracks = conventional(tracks, model)
     tracks = _continuous_signs(tracks)
     tracks = unswap(tracks, model)
-    tracks = _without_spikes(tracks, longest)
-    return _filled(tracks, longest)
+    tracks = _without_spikes(tracks)
+    return _filled(tracks)
 
 
 def survey(recording: Recording) -> tuple[str, ...]:
@@ -59,10 +59,10 @@ def distance(p: Array, q: Array, p2: Array, q2: Array) -> Array:
     return np.asarray(np.linalg.norm(p - p2, axis=-1) + _ARM * quat.angle_between(q, q2))
 
 
-def _without_spikes(tracks: Tracks, longest: float) -> Tracks:
+def _without_spikes(tracks: Tracks) -> Tracks:
     """Blanks short runs that leap away and back, faster than any servo moves a link."""
     p, q, problems = tracks.p.copy(), tracks.q.copy(), list(tracks.problems)
-    most = max(1, round(longest * tracks.rate))
+    most = max(1, round(LONGEST_MENDED * tracks.rate))
     for i, asset in enumerate(tracks.assets):
         seen = np.flatnonzero(tracks.seen[i])
         if len(seen) < 3:
@@ -89,7 +89,7 @@ def gaps_of(seen: NDArray[np.bool_]) -> NDArray[np.int_]:
     return edges.reshape(-1, 2)
 
 
-def _filled(tracks: Tracks, longest: float) -> Tracks:
+def _filled(tracks: Tracks) -> Tracks:
     p, q, reach = tracks.p.copy(), tracks.q.copy(), tracks.seconds_squared.copy()
     mended, problems = tracks.mended.copy(), list(tracks.problems)
     n = len(tracks.time)
@@ -99,7 +99,7 @@ def _filled(tracks: Tracks, longest: float) -> Tracks:
             continue
         length = gaps[:, 1] - gaps[:, 0]
         inside = (gaps[:, 0] > 0) & (gaps[:, 1] < n)
-        short = inside & (length <= longest * tracks.rate + 1e-6)
+        short = inside & (length <= LONGEST_MENDED * tracks.rate + 1e-6)
         for first, end in gaps[short]:
             at = np.arange(first, end)
             a, b = first - 1, end

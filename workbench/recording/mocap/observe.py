@@ -112,12 +112,12 @@ def _bodies(poses: dict[str, tuple[Array, Array]], p0: Array, m: Measurement) ->
             turn[good] = quat.from_matrix(since_rest[good])
         turn = turned_quaternion(turn, m.yaw)
         if asset in m.frames:
-            turn = quat.multiply(turn, _frame_turn(asset, m))
+            turn = quat.multiply(turn, frame_turn(asset, m))
         out[asset] = BodyTrack(turned(p_W, m.yaw) + m.origin, quat.continuous(turn)[0])
     return out
 
 
-def _frame_turn(asset: str, m: Measurement) -> Array:
+def frame_turn(asset: str, m: Measurement) -> Array:
     """The turn of an asset's frame (4,), in the capture's axes turned into the model's."""
     vector = model_axes(np.asarray(m.frames[asset], dtype=float))
     angle = float(np.linalg.norm(vector))

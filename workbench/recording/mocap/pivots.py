@@ -22,16 +22,15 @@ _CORRELATED = 10  # errors of a model last; so many frames count as one
 
 @dataclass(frozen=True)
 class Pivots:
-    """pivots and sigma: asset -> p_LP_L (3,) [m] in the link's frame and its standard deviation. residual: asset -> RMS [m]."""
+    """pivots and sigma: asset -> p_LP_L (3,) [m] in the link's frame and its standard deviation."""
 
     pivots: Mapping[str, Array]
     sigma: Mapping[str, Array]
-    residual: Mapping[str, float]
 
 
 def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, rest_pose: Mapping[str, float],
                 rest_rotation: Array) -> Pivots:
-    """Linear least squares of all pivots together (3 unknowns each), through the kinematic tree.
+    """Linear least squares for every pivot at once (3 unknowns each), through the kinematic tree.
 
     With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame,
     which is linear in all pivots. A pivot that turns with no joint, above all across the machine, is determined weakly or not at
@@ -43,8 +42,8 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     assets = tracks.assets
     centers = np.array([k.centers.get(model.rigid_bodies[a], np.zeros(3)) for a in assets])
     if root is None:
-        return Pivots(dict(zip(assets, centers)), {a: np.full(3, _PRIOR) for a in assets}, {})
-    use = _frames(tracks, angles, root)
+        return Pivots(dict(zip(assets, centers)), {a: np.full(3, _PRIOR) for a in assets})
+    use = _frames(tracks, root)
     q = angles.q[use] + np.array([rest_pose.get(j, 0.0) for j in angles.joints])
     poses = k.forward(np.nan_to_num(q), angles.joints)
     p_B, R_B = poses[model.base]
@@ -52,7 +51,6 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     R_WB = quat.matrix(quat.multiply(turned_quaternion(tracks.q[root, use], -yaw), rest_rotation))
     size = 3 * len(assets)
     N, rhs = np.zeros((size, size)), np.zeros(size)
-    rows: dict[int, tuple[Array, Array]] = {}
     b = slice(3 * root, 3 * root + 3)
     for i, asset in enumerate(assets):
         link = model.rigid_bodies[asset]
@@ -75,19 +73,16 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
         N[b, a] -= total
         rhs[a] += np.einsum("nji,nj->i", R_BL, y)
         rhs[b] -= y.sum(axis=0)
-        rows[i] = R_BL, y
     weight = 1 / (_MODEL**2 * _CORRELATED)
     prior = np.eye(size) / _PRIOR**2
     information = weight * N + prior
     solution = np.linalg.solve(information, weight * rhs + prior @ centers.ravel()).reshape(-1, 3)
     covariance = np.linalg.inv(information)
-    residual = {assets[i]: float(np.sqrt(np.mean((R_BL @ solution[i] - solution[root] - y) ** 2)))
-                for i, (R_BL, y) in rows.items()}
     spread = np.sqrt(np.diag(covariance)).reshape(-1, 3)
-    return Pivots(dict(zip(assets, solution)), dict(zip(assets, spread)), residual)
+    return Pivots(dict(zip(assets, solution)), dict(zip(assets, spread)))
 
 
-def _frames(tracks: Tracks, angles: Angles, root: int) -> NDArray[np.int64]:
+def _frames(tracks: Tracks, root: int) -> NDArray[np.int64]:
     """Frames in which the base is seen and nothing is repaired, evenly spread, at most a few hundred."""
     use = np.flatnonzero(tracks.seen[root] & ~tracks.mended)
     if len(use) < 10:

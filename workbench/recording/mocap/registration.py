@@ -58,7 +58,7 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
     return Measurement(
         starts_at=start.time, starts_at_sigma=start.sigma, joint_starts=start.by_joint, yaw=heading.yaw, yaw_sigma=heading.sigma,
         origin=base_origin(tracks, model, heading.yaw, found.pivots, resting, rest.rotation),
-        pivots=found.pivots, pivot_sigma=found.sigma, pivot_residual=found.residual,
+        pivots=found.pivots, pivot_sigma=found.sigma,
         rest=_rest_poses(tracks, resting),
         noise=dict(zip(angles.joints, noise_at_rest(angles.q, resting & ~tracks.mended))),
         position_noise=_position_noise(tracks, resting), rest_pose=rest.pose, rest_rotation=rest.rotation)

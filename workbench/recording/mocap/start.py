@@ -32,12 +32,13 @@ class StartEstimate:
     by_joint: dict[str, float]
 
 
-def lagged_reference(commands: Commands, rate: float = 1000.0, lead: float = 0.3) -> Take:
-    """A stand-in for a simulated take: the servos' reference through a critically damped second-order lag."""
+def lagged_reference(commands: Commands) -> Take:
+    """A stand-in for a simulated take, at 1 kHz from 0.3 s before the first command: the servos' reference through a critically
+    damped second-order lag."""
     from scipy.signal import lfilter
 
-    time = np.arange(-lead, commands.end + 0.5, 1 / rate)
-    keep = np.exp(-_LAG / rate)
+    time = np.arange(-0.3, commands.end + 0.5, 1e-3)
+    keep = np.exp(-_LAG * 1e-3)
     q = commands.reference(time)
     for _ in range(2):
         q = np.asarray(lfilter([1 - keep], [1, -keep], q, axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -131,10 +132,11 @@ class SeenJoint:
     axis: Array
 
 
-def seen_joints(tracks: Tracks, model: RobotModel, base: str) -> tuple[list[SeenJoint], list[str]]:
-    """Joints whose two sides are tracked, in the model's order, and a line for each that hides behind an untracked link."""
+def seen_joints(assets: Sequence[str], model: RobotModel, base: str) -> tuple[list[SeenJoint], list[str]]:
+    """Joints whose two sides are among the tracked `assets`, in the model's order, and a line for each that hides behind an
+    untracked link. Rows of the joints are those of the assets."""
     k = model.kinematics
-    row = {model.rigid_bodies[a]: i for i, a in reversed(list(enumerate(tracks.assets)))}
+    row = {model.rigid_bodies[a]: i for i, a in reversed(list(enumerate(assets)))}
     neutral = {link: R[0] for link, (_, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
     to_base = neutral[model.base].T if model.base in neutral else np.eye(3)
     joints, problems = [], []

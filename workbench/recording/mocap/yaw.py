@@ -41,8 +41,8 @@ class _Evidence:
     variance: float
 
 
-def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = (),
-                base: str = "free") -> YawEstimate:
+def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = ()
+                ) -> YawEstimate:
     """One yaw for all takes of a session, whose capture frame does not move (docs/formats.md, section 1).
 
     In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so what tells the
@@ -51,7 +51,7 @@ def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Se
     else the sign in which joints follow their commands.
     """
     tracks = [_prepared(r, model) for r in recordings if r.sensing == "mocap"]
-    return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))], base)
+    return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))])
 
 
 def _prepared(recording: Recording, model: RobotModel) -> Tracks:
@@ -63,7 +63,7 @@ def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Comman
     """As `session_yaw`, of tracks."""
     evidence: list[_Evidence] = []
     for tracks in takes:
-        for joint in seen_joints(tracks, model, base)[0]:
+        for joint in seen_joints(tracks.assets, model, base)[0]:
             evidence += _axis_evidence(tracks, joint)
     if not evidence:
         raise InputError(None, "yaw: no tracked joint turns by more than 2 degrees about a level axis: the robot hardly "
@@ -147,7 +147,7 @@ def _following(tracks: Tracks, model: RobotModel, commands: Commands | None, yaw
     """Sum over joints [rad] of how far they turned to the side to which commands turn them further; needs no start."""
     assert commands is not None
     total = 0.0
-    for joint in seen_joints(tracks, model, base)[0]:
+    for joint in seen_joints(tracks.assets, model, base)[0]:
         if joint.name not in commands.joints:
             continue
         q = quat.swing_twist(relative_rotation(tracks, joint), turned(joint.axis, yaw))[0]

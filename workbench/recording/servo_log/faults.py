@@ -15,6 +15,7 @@ from workbench.recording.servo_log.let_go import lets_go
 from workbench.recording.servo_log.no_answer import without_no_answer
 from workbench.recording.servo_log.relative import relative_goals
 from workbench.recording.servo_log.repeats import without_repeats
+from workbench.recording.servo_log.unlike import none_follows, rounded, unlike
 from workbench.recording.servo_log.zero_shift import zero_shifts
 
 
@@ -33,8 +34,13 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     goals are none or that their servos let go. skipped: joints of which another check has told already."""
     channels, lines = dict(recording.channels), []
     joints = [j for j in recording.joints if f"position.{j}" in channels and j not in skipped]
+    coarse = set()
     for joint in joints:
         name = f"position.{joint}"
+        if (text := rounded(channels[name])) is not None:  # its steps look like leaps
+            coarse.add(joint)
+            lines.append(f"{name}: {text}")
+            continue
         for read in (without_astray, without_no_answer, without_repeats):
             channels[name], said = read(recording.time, channels[name])
             lines += [f"{name}: {text}" for text in said]
@@ -54,9 +60,14 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     for joint, log in logs.items():
         if joint in no_goals:
             continue
-        log, said = _zeroed(channels, log)
-        said += _released(channels, recording, log)
-        lines += said or [f"position.{joint}: {text}" for text in held_back(log)]
+        said = []
+        if joint not in coarse:
+            log, said = _zeroed(channels, log)
+            said += _released(channels, recording, log)
+        lines += said or [f"position.{joint}: {text}" for text in list(held_back(log)) or unlike(log)]
+    if not any("does not follow" in text for text in lines):
+        alone = none_follows({j: log for j, log in logs.items() if j not in no_goals})
+        lines += [alone] if alone else []
     for joint in no_goals:
         channels[f"position.{joint}"] = np.full(len(recording.time), np.nan)
     return Mended(replace(recording, channels=channels), tuple(lines), frozenset(no_goals))

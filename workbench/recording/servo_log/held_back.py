@@ -47,13 +47,13 @@ def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
         yield (f"does not follow goal.{log.name}: it moves over {seen:.3g} deg where the goal moves over {asked:.3g} deg: torque "
                "off, a gain of 0, a servo or horn that came loose, or another joint's column?")
         return
-    yield from _ends(log, fit, c)
+    yield from _ends(log, c)
     if fit.explained < c.explained or abs(fit.gain - 1) > c.tolerance:
         return
     yield from _stands_off(log, fit, c)
 
 
-def _ends(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:
+def _ends(log: JointLog, c: HeldBackChecks) -> Iterator[str]:
     for sign, which in ((1, "above"), (-1, "below")):
         value = float(np.max(sign * log.position)) * sign
         there = log.position == value

@@ -47,7 +47,7 @@ def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
         lead = _lead(r.time[on], goal[on], position[on], c)
         if lead is not None:
             yield (f"position.{joint}: precedes goal.{joint} by {1e3 * lead:.0f} ms, which no servo does: were the goals logged "
-                   "late, or derived from the motion?")
+                   "late, or derived from the motion, or are the two columns exchanged?")
 
 
 def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:
@@ -59,7 +59,8 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
     inside = (time >= time[0] + most) & (time <= time[-1] - most)
     if inside.sum() < c.fewest:
         return None
-    left = np.array([_unexplained_share(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
+    seen = position[inside] - position[inside].mean()
+    left = np.array([_unexplained_share(np.interp(time[inside] - lag, time, goal), seen) for lag in lags])
     best = int(np.argmin(left))
     ahead = lags <= -c.rows * row
     if not ahead[best] or left[best] > 1 - c.likeness or best == 0:
@@ -68,9 +69,15 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
 
 
 def _unexplained_share(goal: Array, position: Array) -> float:
-    """Share of the position's variance that a goal, scaled by a positive number and moved, does not explain."""
-    a, b = goal - goal.mean(), position - position.mean()
-    total, along = float(b @ b), float(a @ b)
+    """Share of a position's variance that a goal, scaled by a positive number and moved, does not explain. position: less its
+    mean."""
+    a, b = goal - goal.mean(), position
+    total, along = _product(b, b), _product(a, b)
     if total == 0 or along <= 0:
         return 1.0
-    return 1 - along**2 / (total * float(a @ a))
+    return 1 - along**2 / (total * _product(a, a))
+
+
+def _product(a: Array, b: Array) -> float:
+    """a @ b on one core: BLAS would wake all of them for each of hundreds of short products."""
+    return float(np.einsum("i,i->", a, b))

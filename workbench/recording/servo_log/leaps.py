@@ -88,7 +88,13 @@ class _Said:
             elif kind == "a 16-bit register that wrapped":
                 out.append(f"{count} reading(s) come from {kind}, first by {at}; undone")
             elif kind == "no turn":
-                out.append(f"{count} reading(s) lie where no servo gets that fast, first by {at}; left as they are")
+                out.append(f"{count} reading(s) lie where no servo gets that fast, first by {at}; left as they are"
+                           f"{_much(count, len(self.time))}")
             else:
                 out.append(f"{count} reading(s) leap away by {kind}, first by {at}; taken out")
         return out
+
+
+def _much(count: int, rows: int) -> str:
+    """What so many leaps mean where they are no exception."""
+    return ": is it an angle, in degrees, and not a velocity, an error or an angle that wraps?" if count > 0.2 * rows else ""

@@ -69,8 +69,8 @@ def _stretches(time: Array, position: Array, fit: Response, c: LetGoChecks) -> l
     near = np.flatnonzero(away < c.tight * fit.spread)
     out: list[tuple[int, int]] = []
     for first, end in runs_of_true(away > max(c.leaves * fit.spread, np.deg2rad(c.least))):
-        before, after = near[near < first], near[near >= end]
-        begin, stop = int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(time)
+        before, after = np.searchsorted(near, (first, end))
+        begin, stop = int(near[before - 1]) + 1 if before else 0, int(near[after]) if after < len(near) else len(time)
         if out and begin < out[-1][1]:
             continue
         out.append((begin, stop))

@@ -17,6 +17,8 @@ from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.logged import as_logged
+from workbench.recording.servo_log.other_channels import channel_problems, few_rows
+from workbench.recording.servo_log.reversed_roles import reversed_roles
 from workbench.recording.servo_log.started import ramp_problems
 from workbench.recording.servo_log.supply import supply_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
@@ -57,13 +59,20 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     view."""
     time = recording.time
     _bounded(recording, checks)
-    if recording.sensing != "encoders" or len(time) < 3 or np.any(np.diff(time) <= 0):
+    if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
-    channels, problems = dict(recording.channels), list(recording.problems)
+    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
+    if len(time) < 3:
+        return replace(recording, problems=tuple(problems))
+    exchanged = {j: text for j, text in reversed_roles(recording)
+                 if _shift_of_equals(channels[f"goal.{j}"], channels[f"position.{j}"], checks) is None}
+    problems += exchanged.values()
     for joint in recording.joints:
         name = f"position.{joint}"
         goal = channels.get(f"goal.{joint}")
-        if name in channels and not (goal is not None and _in_another_unit(goal)):
+        if joint in exchanged:
+            channels[name] = np.full(len(time), np.nan)
+        elif name in channels and not (goal is not None and _in_another_unit(goal)):
             channels[name], said = without_leaps(time, channels[name])
             problems += [f"{name}: {text}" for text in said]
     read = replace(recording, channels=channels)
@@ -71,6 +80,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         problems += check(read, checks)
     problems += unit_problems(read)
     problems += supply_problems(read)
+    problems += channel_problems(read)
     mended = without_faults(read, frozenset(j for j in read.joints if any(
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines
@@ -111,11 +121,14 @@ def _in_another_unit(goal: Array) -> bool:
 def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
     steps = np.diff(r.time)
     middle = float(np.median(steps))
-    if middle > c.slow:
+    if np.all(steps == 1.0):
+        yield f"time: rows are 1 s apart, {r.time[-1] - r.time[0]:g} s in all: is it the number of the row, or of the frame?"
+    elif middle > c.slow:
         unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
         yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
     elif middle < c.fast:
-        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in minutes?")
+        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in "
+               f"{'minutes' if 60 * middle > c.fast else 'hours'}?")
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))

@@ -23,19 +23,19 @@ class UnitChecks:
     than so many degrees only in radians [deg]. fine: steps that no hobby servo's sensor resolves (16384 counts a turn) [deg].
     moves: a joint that moves less is not checked [deg]. goes: least motion for a comparison with another channel [deg].
     far: a joint that never comes nearer to its servo's centre is counted from elsewhere, or in counts [deg]. off: a joint that
-    follows its goal does not stay so far from it [deg]. alike: tolerance of a ratio from a unit's. follows:
+    follows its goal does not stay so far from it [deg]. tolerance: of a ratio from a unit's. follows:
     correlation above which one channel follows another, by `lag` at most [s]. volts: above the supply of any servo of a small
     robot [V]. rows: fewer are not checked.
     """
 
-    turns: float = 2.0
+    turns: float = 1.25
     radian_range: float = 3.5
     fine: float = 0.02
     moves: float = 0.05
     goes: float = 5.0
     far: float = 180.0
     off: float = 60.0
-    alike: float = 0.15
+    tolerance: float = 0.15
     follows: float = 0.9
     lag: float = 0.2
     volts: float = 30.0
@@ -122,7 +122,7 @@ def _against_goal(r: Recording, c: UnitChecks, joint: str, position: Array) -> I
         return
     for unit, ratio in _OTHER.items():
         for which, mine, other, its in (("position", done, "goal", asked), ("goal", asked, "position", done)):
-            if unit != r.units and abs(mine / its / ratio - 1) < c.alike:
+            if unit != r.units and abs(mine / its / ratio - 1) < c.tolerance:
                 yield f"{which}.{joint}: goes over {mine:.3g} deg where {other}.{joint} goes over {its:.3g} deg: is it in {unit}?"
                 return
     if follows < 0:
@@ -173,7 +173,7 @@ def _velocity(r: Recording, c: UnitChecks, joint: str, position: Array) -> Itera
     if abs(alike) < c.follows:
         return
     ratio = float(np.sqrt(np.mean(logged[both] ** 2) / np.mean(slope[both] ** 2)))
-    unit = next((name for name, of in _RATES.items() if abs(ratio / of - 1) < c.alike), None)
+    unit = next((name for name, of in _RATES.items() if abs(ratio / of - 1) < c.tolerance), None)
     if unit is not None:
         yield f"velocity.{joint}: is {ratio:.3g} times the slope of position.{joint}: is it in {unit}?"
     elif alike < 0:

@@ -14,22 +14,24 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class ShiftChecks:
-    """least: of a step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from theirs
-    in the `near` rows on each side. beyond: or so many times all steps of the log but a hundredth. alike: largest difference, in
-    shares of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
-    within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart are not used [s]. explained: share
-    of the position's variance that the goals must explain. doubt: of two levels, the one nearer to the goals counts as the right
-    one, the first where they are equally near to that share."""
+    """least: smallest step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from
+    theirs in the `near` rows on each side. beyond: or so many times 99 % of the log's steps. alike: largest difference, as a
+    share of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
+    within `before` explains it [s]. rows: fewest in a stretch. slowest: rows further apart are not used [s]. pause: steps across
+    or next to rows that are so many medians apart are not used. explained: share of the position's variance that the goals must
+    explain. doubt: of two levels, the one nearer to the goals counts as the right one, the first where they are equally near to
+    that share."""
 
     least: float = 1.0
     times: float = 4.0
     near: int = 8
     beyond: float = 1.5
-    alike: float = 0.35
+    agreement: float = 0.35
     goal: float = 0.4
     before: float = 0.3
     rows: int = 5
     slowest: float = 0.1
+    pause: float = 3.0
     explained: float = 0.5
     doubt: float = 0.3
 
@@ -46,7 +48,8 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     steps = np.diff(log.position)
     extra = steps[1:-1] - (steps[:-2] + steps[2:]) / 2  # beyond the mean of its neighbours, of step i + 1
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
-    inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
+    apart = np.diff(log.time) > c.pause * float(np.median(np.diff(log.time)))
+    inside = [int(k) for k in large if 2 <= k < len(steps) - 2 and not apart[k - 1:k + 2].any()]
     far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
     at = [k for k in inside if _stands_out(steps, extra, k, c) and not _goal_stepped(log, k, extra[k - 1], c)] or \
         [k for k in inside if _leaps(log, k, abs(extra[k - 1]), far) and not _goal_stepped(log, k, extra[k - 1], c)]
@@ -64,9 +67,9 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     for i, jump in enumerate(jumps):
         if min(edges[i + 1] - edges[i], edges[i + 2] - edges[i + 1]) < c.rows:
             return none, []
-        if abs(middle[i + 1] - middle[i] - jump) > c.alike * abs(jump):
+        if abs(middle[i + 1] - middle[i] - jump) > c.agreement * abs(jump):
             return none, []
-    true = _true_level(level, edges, middle, fit.offset, c)
+    true = _true_level(level, middle, fit.offset, c)
     off = np.repeat(level - level[true], np.diff(edges))
     return off, [_line(log, off, edges)]
 
@@ -94,7 +97,7 @@ def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     return bool(len(bend) and np.max(bend * np.sign(step)) > c.goal * abs(step))
 
 
-def _true_level(level: Array, edges: list[int], middle: list[float], offset: float, c: ShiftChecks) -> int:
+def _true_level(level: Array, middle: list[float], offset: float, c: ShiftChecks) -> int:
     """The stretch whose zero is right: that nearest to the goals, or the first where there is little between them."""
     distance = np.abs(np.array(middle) + offset)
     best = int(np.argmin(distance))

@@ -2,6 +2,6 @@
 is doubtful in it."""
 
 from workbench.robot.model_source.checks import link_sizes, model_problems
-from workbench.robot.model_source.prepare import ModelSource, named, prepared
+from workbench.robot.model_source.prepare import ModelSource, prepare, user_file
 
-__all__ = ["ModelSource", "link_sizes", "model_problems", "named", "prepared"]
+__all__ = ["ModelSource", "link_sizes", "model_problems", "prepare", "user_file"]

@@ -102,7 +102,7 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
     bodies = [plant.get_body(b) for b in plant.GetBodyIndices(instances[0])]
     groups = _fixed_together(plant)
     groups = {name: group for name, group in groups.items() if held not in group}
-    feet = () if held else _feet(plant, scene_graph, bodies)
+    feet = () if held else _feet(plant, bodies)
     return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies, held), *feet)
 
 
@@ -211,6 +211,6 @@ def _points(plant: Any, scene_graph: Any, body: Any) -> Array:
     return np.reshape(points, (-1, 3)).astype(float)
 
 
-def _feet(plant: Any, scene_graph: Any, bodies: list[Any]) -> Iterator[str]:
+def _feet(plant: Any, bodies: list[Any]) -> Iterator[str]:
     if plant.GetFloatingBaseBodies() and not any(plant.GetCollisionGeometriesForBody(b) for b in bodies):
         yield "no link has a collision shape: a robot whose base floats falls through the ground"

@@ -37,12 +37,12 @@ class ModelSource:
     notes: tuple[str, ...] = ()
 
 
-def named(path: Path) -> Path:
+def user_file(path: Path) -> Path:
     """The user's file of which `path` was made; `path` itself where it is that."""
     return Path(_NAMES.get(str(path), path))
 
 
-def prepared(source: Path, packages: Mapping[str, str] | None = None) -> ModelSource:
+def prepare(source: Path, packages: Mapping[str, str] | None = None) -> ModelSource:
     """Reads a description once, checks it, and converts parts that Drake cannot read, in the user's cache.
 
     packages: folder of each ROS package that mesh URIs name. InputError names file, link or joint, and the expected value.
@@ -51,13 +51,13 @@ def prepared(source: Path, packages: Mapping[str, str] | None = None) -> ModelSo
         content = source.read_bytes() if source.is_file() else b""
     except OSError:
         content = b""
-    done = _prepared(source, hashlib.sha256(content).hexdigest(), tuple(sorted((packages or {}).items())))
+    done = _prepare(source, hashlib.sha256(content).hexdigest(), tuple(sorted((packages or {}).items())))
     _NAMES[str(done.path)] = str(source)
     return done
 
 
 @lru_cache(maxsize=64)
-def _prepared(source: Path, digest: str, packages: tuple[tuple[str, str], ...]) -> ModelSource:
+def _prepare(source: Path, digest: str, packages: tuple[tuple[str, str], ...]) -> ModelSource:
     root = read_xml(source)
     check_numbers(source, root)
     notes: list[str] = []

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from threading import Event, Lock, get_ident
+from typing import TypeVar
 
 import numpy as np
 from pydrake.math import RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from workbench.effects.apply import Physics, physics_of, played
+from workbench.effects.apply import Physics, apply_to_commands, physics_of
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
@@ -27,6 +29,7 @@ from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
 
+T = TypeVar("T")
 ENDED = {TOUCHED: "shapes touch that are neither a foot on the floor nor a sphere on another link"}
 """Why a run was given up, by how it ended; any other way, Drake shall say."""
 _first, _ran = Lock(), Event()
@@ -43,14 +46,18 @@ def covers(job: Job) -> str | None:
 
 def run_compiled(job: Job) -> Take:
     """The take of a job; NotCoveredError says why it has to be Drake's."""
-    compiled = CompiledJob(job)
+    return announced(CompiledJob(job).take)
+
+
+def announced(play: Callable[[], T]) -> T:
+    """What `play` returns; before the first run on a machine, says that the station is being compiled."""
     if is_compiled() or _ran.is_set():
-        return compiled.take()
+        return play()
     with _first:  # of several threads one compiles and says so, the others wait for it
         if not (is_compiled() or _ran.is_set()):
             logging.getLogger(__name__).warning("compiling the station, once for this version and machine (a minute) ...")
         try:
-            return compiled.take()
+            return play()
         finally:
             _ran.set()
 
@@ -114,7 +121,7 @@ class CompiledJob:
     def _plan(self) -> _Plan:
         job = self.job
         sent = None if job.commands is None else job.commands.reordered(self.model.joints)
-        commands = played(sent, self.model) if sent is not None and self.physics.retimed else sent
+        commands = apply_to_commands(sent, self.model) if sent is not None and self.physics.retimed else sent
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")
@@ -136,10 +143,13 @@ class CompiledJob:
     def take(self, as_seen: bool = True) -> Take:
         """Settles, plays, and reads the log; NotCoveredError where something touches in a way that is Drake's. as_seen: with
         angles as cameras see them where something is between servos and links; else servos' angles and velocities stand."""
+        log = self.log(self.schedule())
+        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - self.plan.lead, as_seen)
+
+    def schedule(self) -> Schedule:
+        """What happens when in this job."""
         plan = self.plan
-        schedule = schedule_of(self.config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
-        log = self.log(schedule)
-        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - plan.lead, as_seen)
+        return schedule_of(self.config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
 
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
@@ -204,8 +214,13 @@ class CompiledJob:
         state.lagging[:] = state.reference
         state.memory[:], state.stepped[:] = 0.0, 0.0
 
+    @property
+    def between(self) -> bool:
+        """Whether joints lie between servos and links, or links have other lengths than in the model's file."""
+        return bool(self.physics.stages) or self.physics.moved
+
     def _structure(self) -> Structure | None:
-        if not self.physics.stages and not self.physics.moved:
+        if not self.between:
             return None
         key = str(self.physics.stages)
         if key not in self.tables.derived:

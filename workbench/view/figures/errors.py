@@ -16,40 +16,38 @@ LIMIT = 1.3
 
 
 @styled
-def joint_errors(
-    channels: Mapping[str, Channel], *, unit: str = "deg", scale: float = 180 / np.pi, limit: float = LIMIT,
-) -> Figure:
+def joint_errors(channels: Mapping[str, Channel]) -> Figure:
     """RMS error of each joint, the largest over noise first, against what noise and numerics alone would make.
 
-    channels: joint -> error, noise, floor, spread in SI; shown times `scale` in `unit`. A bar beyond `limit` times the
+    channels: joint -> error, noise, floor, spread [rad], shown in degrees. A bar beyond `LIMIT` times the
     root of noise² + floor² is orange: there is something left to explain.
     """
     order = by_error(channels, {joint: channel.over_noise for joint, channel in channels.items()})
     figure = new_figure(9, 0.34 * len(order) + 2.1)
     axes = figure.subplots()
     for row, joint in enumerate(order):
-        _row(axes, row, channels[joint], scale, limit)
+        _row(axes, row, channels[joint])
     for label, key, colour, style in (("noise", "noise", ERROR, "-"), ("numerical floor", "floor", FLOOR, "-"),
                                       ("spread between contact models", "spread", COMMAND, ":")):
         if any(getattr(c, key) > 0 for c in channels.values()):
             axes.plot([], [], color=colour, linestyle=style, linewidth=2, label=label)
-    axes.bar(0, 0, color=RECORDED, label=f"error beyond {limit:g} times both")
+    axes.bar(0, 0, color=RECORDED, label=f"error beyond {LIMIT:g} times both")
     axes.bar(0, 0, color=SIMULATED, label="error within")
     axes.set_yticks(range(len(order)), order)
     axes.set_ylim(len(order) - 0.4, -0.6)
     axes.margins(x=0.16)
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
-    axes.set_xlabel(f"RMS error after the first command [{unit}]")
+    axes.set_xlabel("RMS error after the first command [deg]")
     axes.set_title("error of each joint, the largest over noise first")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
-def _row(axes: Axes, row: int, channel: Channel, scale: float, limit: float) -> None:
+def _row(axes: Axes, row: int, channel: Channel) -> None:
     error, noise, floor, spread = (
-        scale * float(np.nan_to_num(x)) for x in (channel.error, channel.noise, channel.floor, channel.spread))
-    bound = limit * float(np.hypot(noise, floor))
+        180 / np.pi * float(np.nan_to_num(x)) for x in (channel.error, channel.noise, channel.floor, channel.spread))
+    bound = LIMIT * float(np.hypot(noise, floor))
     colour = RECORDED if error > bound > 0 else SIMULATED
     axes.barh(row, bound, 0.86, color=NOISE, zorder=1, label="explained by noise and numerics" if row == 0 else None)
     axes.barh(row, error, 0.5, color=colour, zorder=2)

@@ -28,10 +28,10 @@ class EncodedFigure:
 def encode(figure: Figure) -> EncodedFigure:
     """SVG, or PNG where the SVG would be large and larger. The same figure gives the same bytes."""
     _settle(figure)
-    svg = EncodedFigure("image/svg+xml", _printed(figure, "svg"))
+    svg = EncodedFigure("image/svg+xml", _print_figure(figure, "svg"))
     if len(svg.content) <= LARGEST_SVG:
         return svg
-    png = EncodedFigure("image/png", _printed(figure, "png"))
+    png = EncodedFigure("image/png", _print_figure(figure, "png"))
     return min(svg, png, key=lambda encoded: len(encoded.content))
 
 
@@ -43,7 +43,7 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     if kind not in ("svg", "png", "pdf"):
         raise InputError(path, "expected a figure's name to end in .svg, .png or .pdf")
     _settle(figure)
-    return write_whole(path, _printed(figure, kind))
+    return write_whole(path, _print_figure(figure, kind))
 
 
 def _settle(figure: Figure) -> None:
@@ -54,7 +54,7 @@ def _settle(figure: Figure) -> None:
         figure.set_layout_engine("none")
 
 
-def _printed(figure: Figure, kind: str) -> bytes:
+def _print_figure(figure: Figure, kind: str) -> bytes:
     out = io.BytesIO()
     metadata = {"svg": {"Date": None}, "png": {"Software": None}, "pdf": {"CreationDate": None}}[kind]
     figure.savefig(out, format=kind, metadata=metadata)

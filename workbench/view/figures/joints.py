@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from workbench.compare.comparison import aligned
+from workbench.compare.comparison import align
 from workbench.compare.metrics import rms
 from workbench.dynamics.derivatives import differentiate
 from workbench.recording.take import Take
@@ -76,7 +76,7 @@ def joint_grid(
     joints = tuple(joints or simulated.joints)
     low, high = span or _shared_span(simulated, recorded)
     figure, grid = panels(len(joints), columns=3, width=12, height=1.9)
-    onto = aligned(simulated, recorded) if recorded is not None else None
+    onto = align(simulated, recorded) if recorded is not None else None
     for axes, joint in zip(grid, joints):
         _draw_joint(axes, joint, simulated, recorded, width=1.2)
         axes.set_title(joint, fontsize=12)
@@ -134,7 +134,7 @@ def _draw_joint(axes: Axes, joint: str, simulated: Take, recorded: Take | None, 
 
 
 def _draw_error(axes: Axes, joint: str, simulated: Take, recorded: Take, noise: float | None, floor: float | None) -> None:
-    onto = aligned(simulated, recorded)
+    onto = align(simulated, recorded)
     clock = since_start(recorded)
     error = np.degrees(recorded.q[:, recorded.column(joint)] - onto.q[:, onto.column(joint)])
     says = [f"{float(rms(error[clock >= 0])):.2f}° RMS"]

@@ -13,8 +13,7 @@ from workbench.compare.metrics import rms
 from workbench.robot.model import RobotModel
 from workbench.servo import ServoLaw
 from workbench.types import Array
-from workbench.view.figures.stance import Stance
-from workbench.view.figures.style import ACCENT, ERROR, NOISE, OTHERS, RECORDED, SIMULATED, STANCE, new_figure, panels, styled
+from workbench.view.figures.style import ACCENT, NOISE, OTHERS, RECORDED, SIMULATED, STANCE, new_figure, panels, styled
 
 _PARTS = {"t": ("top joints", OTHERS[2]), "m": ("middle joints", SIMULATED), "b": ("bottom joints", ACCENT),
           "": ("other joints", OTHERS[0])}
@@ -92,7 +91,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
 
 @styled
 def base_wrench(
-    time: Array, residual: Array, sigma: Array | None = None, *, stance: Stance | None = None, weight: float | None = None,
+    time: Array, residual: Array, sigma: Array | None = None, *, weight: float | None = None,
 ) -> Figure:
     """The wrench on the base that the motion needs and no contact inside the friction cone supplies.
 
@@ -117,9 +116,6 @@ def base_wrench(
         axes.set_title(says)
         axes.set_ylabel(f"{what} [{unit}]")
         axes.margins(x=0)
-        for feet in (stance or {}).values():
-            for a, b in feet:
-                axes.axvspan(a, b, color=ERROR, alpha=0.04, linewidth=0, zorder=0.4)
     figure.legend(*rows[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     rows[1].set_xlabel("time [s]")
     return figure

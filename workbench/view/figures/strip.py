@@ -22,12 +22,11 @@ WIDEST = 2.5
 @styled
 def film_strip(
     model: RobotModel, simulated: Take, recorded: Take | None = None, *, instants: int = 6,
-    span: tuple[float, float] | None = None,
 ) -> Figure:
-    """Side view from the right at `instants` even times over `span` [s since the first command]; the recorded robot is laid
+    """Side view from the right at `instants` even times from the first command on; the recorded robot is laid
     over the simulated one where both stood; where it is out of the picture, how far. Far legs are thinner."""
     takes = [simulated] if recorded is None else [simulated, recorded]
-    first, last = span or common_span(takes, lead=0.0)
+    first, last = common_span(takes, lead=0.0)
     time = np.concatenate([[first - 0.1], np.linspace(first, last, instants)])  # the first stands for the rest
     played = play(simulated, model, time)
     names = names_of(simulated, recorded)

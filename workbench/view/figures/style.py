@@ -82,10 +82,10 @@ def rgb(colour: str) -> tuple[float, float, float]:
     return int(colour[1:3], 16) / 255, int(colour[3:5], 16) / 255, int(colour[5:7], 16) / 255
 
 
-def legend_above(axes: Axes, columns: int = 6) -> None:
+def legend_above(axes: Axes) -> None:
     """A one-line legend over the axes, to the right, where no curve can hide it."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.2, columnspacing=1.4,
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.2, columnspacing=1.4,
                     handlelength=1.8)
 
 

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.options import PROBLEM
-from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
+from workbench.identify.results.findings import Diagnosis, Estimate, GapEntry
 from workbench.identify.results.take_report import TakeReport
 from workbench.types import Progress
-from workbench.view.figures import body_path, film_strip
+from workbench.view.figures import body_path
 from workbench.view.figures.errors import LIMIT
-from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
-from workbench.view.figures.heat import DARKEST
-from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
-from workbench.view.report.tables import folded, place_of, rivals, tried
+from workbench.view.figures.gap import gap_map, robot_map, unseen_errors
+from workbench.view.report.finding import finding_section, finite
+from workbench.view.report.page import Details, Part, Picture, Provenance, Report, Section, Text
+from workbench.view.report.replays import write_replays
+from workbench.view.report.servo_law import recalibrated_section, tied_in_short, tied_section, unknown_torque_section
+from workbench.view.report.tables import folded_table, place_of, rejected_table, rivals
 from workbench.view.report.words import (
     capital,
-    change,
     headline,
     hidden_effects,
     in_words,
-    intervals_of,
+    interval,
     is_error,
     layers_of,
     left_row,
@@ -35,13 +35,11 @@ from workbench.view.report.words import (
     probable,
     quantity,
     rival_of,
+    said_aside,
     sentence_of,
     this_or,
     title_of,
-    unbroken,
 )
-from workbench.view.scene.marks import Errors
-from workbench.view.scene.replay import write_replay
 
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
@@ -53,52 +51,30 @@ def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: P
     returns their paths. takes: the takes behind the diagnosis; progress: called with the current file and the share done."""
     paths = diagnosis.save(folder)
     report = diagnosis_report(diagnosis, takes, title)
-    replays: list[Part] = []
-    for i, take in enumerate(takes):
-        progress(f"drawing {take.name}", i / len(takes))
-        paths.append(folder / f"replay-{take.name}.html")
-        errors = _errors(take)
-        write_replay(paths[-1], diagnosis.model, take.fitted, take.recorded, take.name, errors)
-        poster = film_strip(diagnosis.model, take.fitted, take.recorded)
-        replays.append(Replay(paths[-1], _replay_caption(take, errors), poster))
+    replays = write_replays(diagnosis, takes, folder, progress)
+    paths += [folder / f"replay-{take.name}.html" for take in takes]
     if replays:
         report.add(Section("See it move", replays))
     return [report.write(folder / "report.html"), *paths]
-
-
-def _errors(take: TakeReport) -> list[Errors]:
-    """Legend of the replay's error map: that of the nominal model, and on demand that of the fitted one."""
-    out = [Errors("error against the nominal model", take.time, take.channels, take.before)]
-    if not np.array_equal(take.before, take.after, equal_nan=True):
-        out.append(Errors("error against the fitted model", take.time, take.channels, take.after, shown=False))
-    return out
-
-
-def _replay_caption(take: TakeReport, errors: Sequence[Errors]) -> str:
-    said = (f"{take.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
-            f"above, as it runs: small and pale where a joint is within {LIMIT:g} times noise and numerics of the nominal model, "
-            f"large and dark at {DARKEST:g} times, grey where it was not seen.")
-    if any(c in BODY for c in take.channels):
-        said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
-    return said + (" Tick the fitted model's to see the residuals." if len(errors) > 1 else "")
 
 
 def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: str) -> Report:
     """The page without its replays."""
     known = dict(diagnosis.provenance)
     seed, seconds = known.pop("seed", None), known.pop("seconds", None)
-    known.pop("cannot_show", None)  # in the summary
+    for name in ("cannot_show", "set_aside"):  # in the summary
+        known.pop(name, None)
     more = [(k, ", ".join(f"{a} {b}" for a, b in v.items()) if isinstance(v, dict) else str(v))
             for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
     report = Report(title, headline(diagnosis), _summary(diagnosis, takes), _key_numbers(diagnosis, takes),
                     Provenance(diagnosis.nominal.sha256, seed, seconds, more))
     report.add(_where(diagnosis, takes))
     drawn: set[tuple[int, str]] = set()
-    for finding in diagnosis.findings:
-        elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
-        report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
     if diagnosis.tied:
         report.add(tied_section(diagnosis.tied))
+    for finding in diagnosis.findings:
+        elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
+        report.add(finding_section(finding, diagnosis.rejected, takes, drawn, elsewhere))
     for unknown in diagnosis.unknown_torques:
         report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:
@@ -108,14 +84,16 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     report.add(_residuals_section(diagnosis))
     others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", tried(others, "more that were tried")))
+        report.add(Section("What else was tried", rejected_table(others, "more that were tried")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
 
 
 def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
-    what = [*(sentence_of(f) for f in diagnosis.findings), *(u.evidence for u in diagnosis.unknown_torques)]
+    what = [*(tied_in_short(t) for t in diagnosis.tied),
+            *(sentence_of(f) for f in diagnosis.findings if f.of_tie is None),
+            *(u.evidence for u in diagnosis.unknown_torques)]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
         what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that "
@@ -131,31 +109,33 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     what += [f"Log {name}: {note}." for name, notes in diagnosis.provenance.get("logs", {}).items() for note in notes
              if "stamped" in note]
+    what += said_aside(diagnosis.provenance)
     what += hidden_effects(diagnosis.provenance.get("cannot_show", {}))
     if why := diagnosis.provenance.get("engine", {}).get("because"):
         what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:
-        what.append("The search stopped at its limit of work, so not all that is left was looked into.")
+        what.append("The search stopped at its work limit, so some residuals were not examined.")
     return " ".join(what)
 
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
-    numbers = []
-    for f in diagnosis.findings:
+    numbers = [(f"gravity over torque at {listed(t.where)}", f"{t.ratio.value:.2f}×",
+                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}") for t in diagnosis.tied]
+    for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (
             f" {this_or(f.tie)}" if f.tie else
             f"; or {title_of(rival.effect, rival.where)}: {probable(rival.confidence)}" if rival else "")
-        told = max(f.parameters.values(), key=_bounded, default=None)
+        told = max(f.parameters.values(), key=_is_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in takes:
         before, after = s.ratios(s.before), s.ratios(s.after)
-        worst = max(before, key=lambda c: _finite(before[c]))
+        worst = max(before, key=lambda c: finite(before[c]))
         numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
     return numbers[:8]
 
 
-def _bounded(e: Estimate) -> bool:
+def _is_bounded(e: Estimate) -> bool:
     """Whether the data say anything of it."""
     return bool(np.isfinite([e.low, e.high]).any())
 
@@ -167,7 +147,7 @@ def _size(e: Estimate) -> str:
 def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
     parts: list[Part] = []
     if takes:
-        worst = {c: max((_finite(s.ratios(s.before).get(c, math.nan)) for s in takes), default=0.0)
+        worst = {c: max((finite(s.ratios(s.before).get(c, math.nan)) for s in takes), default=0.0)
                  for s in takes for c in s.channels}
         ledger = sorted(diagnosis.gap, key=lambda g: -g.error / g.floor if g.floor > 0 else -math.inf)
         over = list(dict.fromkeys(place for g in ledger for place in g.where))
@@ -176,17 +156,17 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
         if over and diagnosis.verdict != "no_gap":
             said = f"The recordings differ from the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
         else:
-            said = "Nowhere do the recordings differ from the nominal model by more than chance" + (
+            said = "The recordings do not differ from the nominal model by more than chance" + (
                 "; the table shows the closest candidates." if diagnosis.gap else ".")
         parts.append(Text(said))
         at_joints: dict[str, float] = {}
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
         parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
-                             "Error of each joint with the nominal model; one wrong joint moves others."))
+                             "Error of each joint with the nominal model; an error in one joint also moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
-        parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
+        parts += folded_table(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
@@ -203,61 +183,12 @@ def _map_caption(take: TakeReport) -> str:
 
 
 def _worst(take: TakeReport) -> float:
-    return max(map(_finite, take.ratios(take.before).values()))
+    return max(map(finite, take.ratios(take.before).values()))
 
 
 def _gap_row(g: GapEntry) -> list[str]:
     when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in g.when[:3]) + (" …" if len(g.when) > 3 else "")
     return [g.layer, place_of(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
-
-
-def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[TakeReport], drawn: set[tuple[int, str]],
-             others: Collection[str]) -> Section:
-    """drawn: takes and joints that the page has a figure of; this section's is added. others: places of other findings."""
-    said = sentence_of(finding)
-    parts: list[Part] = [Text(said)]
-    if finding.evidence not in said:
-        parts.append(Text(finding.evidence.removeprefix(said).strip()))
-    sure = probable(finding.confidence)
-    for a in finding.alternatives:
-        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {probable(a.confidence)}.** These recordings alone do not rule "
-                          "that out."))
-        sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
-    if finding.tie:
-        sure += f": {probable(finding.together)} for one of the two"
-    f = finding.family
-    family = [] if f is None else [["probability of the family", f"{f.name}: {probable(f.confidence)}"]]
-    rows = [["probability", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
-    rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
-    parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
-    shown = _best_view(finding, takes, drawn, others)
-    if shown is not None:
-        i, joint = shown
-        drawn.add(shown)
-        parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: recorded, and predicted by each "
-                                                              "model."))
-    instead = [r for r in rejected if rivals(r, finding)]
-    if instead:
-        parts.append(Text("Alternatives that were tried and rejected:"))
-        parts += tried(instead, "more rivals")
-    return Section(capital(title_of(finding.effect, finding.where)), parts)
-
-
-def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]
-               ) -> tuple[int, str] | None:
-    """The take and joint on which the finding shows most: its own joint, else the one that improved most of those that are no
-    place of another finding; one that is not yet drawn, if there is any."""
-    found = [(_gain(s, c), i, c) for i, s in enumerate(takes) for c in s.channels if c in s.recorded.joints]
-    own = [f for f in found if f[2] in finding.where] or [f for f in found if f[2] not in others]
-    new = [f for f in own or found if f[1:] not in drawn]
-    if not found:
-        return None
-    _, i, joint = max(new or own or found)
-    return i, joint
-
-
-def _gain(take: TakeReport, channel: str) -> float:
-    return _finite(take.ratios(take.before)[channel]) - _finite(take.ratios(take.after)[channel])
 
 
 def _unseen(takes: Sequence[TakeReport]) -> Section:
@@ -286,14 +217,10 @@ def _residuals_section(diagnosis: Diagnosis) -> Section:
     header = ["remaining error", "take", "size", "over noise", "correlation"]
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On unseen stretches the fitted model still exceeds noise and numerical error (1×). No "
-                  "effect that was tried explains it."), *folded(header, off, "more")] if off else []
+                  "effect that was tried explains it."), *folded_table(header, off, "more")] if off else []
     return Section("Residuals", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
     assert diagnosis.next_experiment is not None
     return Section("What to record next", [Text(next_said(diagnosis.next_experiment))])
-
-
-def _finite(x: float) -> float:
-    return x if math.isfinite(x) else 0.0

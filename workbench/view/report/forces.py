@@ -13,7 +13,8 @@ from workbench.robot import GRAVITY, RobotModel
 from workbench.view.figures import base_wrench, joint_torques, servo_margins
 
 _MEASURED = ("sd: from the measurement's noise in angles that are differentiated twice; smoothing, and the distribution of load "
-             "between feet, are not included. A robot that exceeds its servos' limits has other servos or loads than the model.")
+             "between feet, are not included. A robot that seems to exceed its servos' limits has "
+             "different servos or loads from the model.")
 
 
 def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[str, Figure]:
@@ -46,6 +47,6 @@ def _with(margin: float, sigma: float) -> str:
 
 def _mark(load: ServoLoad) -> str:
     if load.exceeded:
-        return "   more than the servo has"
+        return "   exceeds the servo's limit"
     negative = not load.feasible and not math.isnan(load.torque_margin)
-    return "   nothing left, or no more than noise makes of it" if negative else ""
+    return "   no margin left, or none beyond the noise" if negative else ""

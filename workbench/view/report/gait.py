@@ -126,7 +126,7 @@ def _walking(take: Take, model: RobotModel, table: GaitTable, walk: tuple[Take, 
         Picture(body_path(take, others=others), "Path of the body, from above and over time."),
         Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "Stance of each foot, in two seconds of walking."),
         Picture(phase_portrait(busiest, take.resampled(take.time[(take.since_start > last - 2.0) & (take.since_start < last)])),
-                f"Speed over angle of {busiest}, the servo with most to do, in the same two seconds."),
+                f"Speed over angle of {busiest}, the most heavily loaded servo, in the same two seconds."),
         Details("Commanded and reached angles, torques, attitude", [
             Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
                     "Each joint, commanded (ramp) and reached; the foot's stance is shaded."),
@@ -195,9 +195,9 @@ def _way_section(certificate: Certificate) -> Section:
     ways = certificate.ways
     rows = [[name, *(f"{value:.2f}" for value in (part.seconds, part.torque, part.tilt, part.jerk))]
             for name, part in (("start", ways.start), ("gait", ways.gait), ("stop", ways.stop))]
-    said = ("Neither jerks the robot more than the gait itself." if ways.smooth else
-            "The robot is jerked more than by the gait itself.")
-    return Section("In, out and back", [
+    said = ("Both are as smooth as the gait itself." if ways.smooth else
+            "They jerk the robot more than the gait itself does.")
+    return Section("Start, stop and return", [
         Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
              "to neutral; both are in `gait.csv`, and all numbers here are of the whole motion. " + said),
         Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows),

@@ -10,7 +10,7 @@ from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.view.figures.unknown_torque import unknown_torque
 from workbench.view.report.page import Part, Picture, Section, Table, Text
-from workbench.view.report.tables import folded
+from workbench.view.report.tables import folded_table
 from workbench.view.report.words import capital, change, listed, probable, title_of, unbroken
 
 
@@ -27,10 +27,20 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
     return Section(f"Unknown torque at {unknown.joint}", parts)
 
 
+def tied_in_short(tie: GravityOverTorque) -> str:
+    """Gravity over torque, and the names of everything that could be the cause."""
+    causes = [title_of(n.effect, n.where) for n in tie.competitive]
+    if tie.may_be_torque:
+        causes.append("other torques of the servo")
+    if len(causes) == 1:
+        return f"{tie.change} Cause: {causes[0]}."
+    return f"{tie.change} Angles alone do not tell the cause: {listed(causes, 'or')}."
+
+
 def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
     """Gravity over torque, and each effect that would explain it alone."""
     rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
-    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
+    return Section("What angles do not tell apart", [*(Text(t.in_words()) for t in ties), *folded_table(
         ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
 
 
@@ -40,5 +50,5 @@ def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     rows = [[r.number.replace("_", " "), listed(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}", unbroken(unit),
              f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
     said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
-    return Section("Recalibrated constants", [Text(said), *folded(
+    return Section("Recalibrated constants", [Text(said), *folded_table(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])

@@ -14,13 +14,13 @@ SHOWN = 6
 """Rows of a table that stand open; the rest is folded away."""
 
 
-def tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
+def rejected_table(rejected: Sequence[Rejected], summary: str) -> list[Part]:
     """A table; without a column of errors where none was measured."""
     measured = any(r.validation is not None for r in rejected)
     header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
     rows = [[unbroken(name_of(r.effect)), place_of(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
             for r in sorted(rejected, key=_unlikely)]
-    parts = folded(header, rows, summary)
+    parts = folded_table(header, rows, summary)
     if any(r.reason.of_chi_squared for r in rejected):
         parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
     return parts
@@ -46,7 +46,7 @@ def rivals(r: Rejected, finding: Finding) -> bool:
     return r.where == finding.where or r.effect == finding.effect
 
 
-def folded(header: list[str], rows: list[list[str]], summary: str) -> list[Part]:
+def folded_table(header: list[str], rows: list[list[str]], summary: str) -> list[Part]:
     """A table of which rows beyond SHOWN are folded away under `summary`."""
     parts: list[Part] = [Table(header, rows[:SHOWN])]
     if len(rows) > SHOWN:

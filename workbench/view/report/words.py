@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.results.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.identify.results.reasons import Dependence, Statement
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import EffectSpec
 
 NAMED = 0.1
@@ -25,7 +27,7 @@ _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
     likely = [f for f in diagnosis.findings if f.likely]
-    names = listed([_with_rival(f) for f in likely or diagnosis.findings])
+    names = listed([_with_rival(f, diagnosis.tied) for f in likely or diagnosis.findings])
     explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
     match diagnosis.verdict:
         case "no_gap":
@@ -41,7 +43,7 @@ def headline(diagnosis: Diagnosis) -> str:
             where = listed([u.joint for u in diagnosis.unknown_torques])
             return f"A torque at {where} that no known effect describes explains at least part of the model's error."
         case "unexplained":
-            return "The recordings differ from the model, and no effect that the workbench knows explains how."
+            return "The recordings differ from the model, and no known effect explains the difference."
 
 
 def hidden_effects(why: Mapping[str, str]) -> list[str]:
@@ -52,19 +54,29 @@ def hidden_effects(why: Mapping[str, str]) -> list[str]:
     return [f"**Cannot show here**, because {reason}: {listed(effects)}." for reason, effects in by_reason.items()]
 
 
-def _with_rival(f: Finding) -> str:
+def _with_rival(f: Finding, tied: Sequence[GravityOverTorque]) -> str:
+    if tie := tie_of(f, tied):
+        others = [title_of(n.effect, n.where) for n in tie.competitive]
+        return f"a change of gravity over torque at {listed(tie.where)} ({listed(others, 'or')})"
     rival = rival_of(f)
     return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
 
 
 def probable(p: float) -> str:
-    """A probability; none of them is as sure as certainty, as all are of models that somebody thought of."""
+    """A probability in words; never 100 %, as only models within the vocabulary were compared."""
     return "more than 99 %" if p > 0.99 else "less than 1 %" if p < 0.01 else f"{100 * p:.0f} %"
 
 
 def rival_of(finding: Finding) -> Alternative | None:
     """The alternative that is likely enough to be named wherever the finding is."""
     return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
+
+
+def tie_of(finding: Finding, tied: Sequence[GravityOverTorque]) -> GravityOverTorque | None:
+    """The tie of which a finding is one name of several."""
+    if finding.of_tie is None:
+        return None
+    return next((t for t in tied if any((n.effect, n.where) == (finding.effect, finding.where[:1]) for n in t.names)), None)
 
 
 def this_or(tie: Alternative) -> str:
@@ -85,7 +97,7 @@ def name_of(effect: str) -> str:
 
 def in_words(statement: Statement) -> str:
     """A reason or a description with effects as a person calls them: "ground friction takes …"."""
-    return statement.said(title_of)
+    return statement.in_words(title_of)
 
 
 def sentence_of(finding: Finding) -> str:
@@ -93,7 +105,7 @@ def sentence_of(finding: Finding) -> str:
     numbers = {name: e.value for name, e in finding.parameters.items()}
     said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
     others = listed(finding.where[1:], "or")
-    return said + (f" Or the same at {others}: these recordings do not say." if others else "")
+    return said + (f" Or the same at {others}: these recordings cannot tell." if others else "")
 
 
 def interval(estimate: Estimate) -> str:
@@ -169,7 +181,7 @@ def layers_of(diagnosis: Diagnosis) -> str:
         several = len(diagnosis.findings) > 1
         said += f" The cause{'s' if several else ''} found: {listed(found)}; one cause may show as errors of several kinds."
     if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
-        said += " Such a cause is felt at many joints at once."
+        said += " Such a cause affects many joints at once."
     return said
 
 
@@ -187,7 +199,7 @@ def left_row(u: Unexplained) -> list[str]:
     joint, _, axis = d.channel.partition(ACROSS)
     what = f"{joint}, across its axis ({axis})" if axis else _BODY.get(d.channel, f"joint {joint}")
     if d.signal is None:
-        return [what, d.take, by, over, "with nothing that was looked at" if u.where else "not with time"]
+        return [what, d.take, by, over, "with no tested signal" if u.where else "not with time"]
     closely = "closely" if d.correlation > 0.7 else "partly" if d.correlation > 0.5 else "loosely"
     own = {"time": "", "size of the angle": "the "}.get(d.signal, "its ")
     return [what, d.take, by, over, f"{closely} with {own}{d.signal} ({d.correlation:.2f})"]
@@ -220,3 +232,9 @@ def capital(text: str) -> str:
 def unbroken(text: str) -> str:
     """Kept on one line."""
     return text.replace(" ", "\u00a0")
+
+
+def said_aside(provenance: Mapping[str, Any]) -> list[str]:
+    """A sentence for each correction of a log, and for each stretch that was excluded from the evidence."""
+    aside = provenance.get("set_aside", {})
+    return [f"Set aside in {take}: {line.rstrip('.')}." for take, lines in aside.items() for line in lines]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.geometry import Cylinder, Meshcat, Rgba
+from pydrake.geometry import Cylinder, Rgba
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from workbench.gait.drive.path import WayPath
@@ -22,10 +22,10 @@ RAISED = 0.004
 
 
 class DriveScene:
-    """meshcat: where to; None: a server of its own while this object lives. place: x, y [m], heading [rad] of the robot shown."""
+    """On a server of its own while this object lives. place: x, y [m], heading [rad] of the robot shown."""
 
-    def __init__(self, model: RobotModel, path: WayPath, discs: Sequence[Disc] = (), meshcat: Meshcat | None = None) -> None:
-        self.meshcat = show_model(model, meshcat or open_meshcat())
+    def __init__(self, model: RobotModel, path: WayPath, discs: Sequence[Disc] = ()) -> None:
+        self.meshcat = show_model(model, open_meshcat())
         links = model.kinematics.forward(np.zeros(len(model.joints)), model.joints)
         self._height = -min(float(p[0, 2]) for p, _ in links.values())
         self._seen: list[Array] = []

@@ -69,11 +69,11 @@ class Marker:
         """A sphere at each joint and at the base, a disc under it, called `name`, coloured and sized over time."""
         paths = []
         for place, ratio in errors.by_place(self.model.joints).items():
-            paths.append(self._placed(name, place))
+            paths.append(self._place(name, place))
             self._animate(paths[-1], ratio, sized=place != PATH)
         return Marks(errors.label, errors.shown, tuple(paths))
 
-    def _placed(self, name: str, place: str) -> str:
+    def _place(self, name: str, place: str) -> str:
         """Adds the mark as a child of the object it moves with; returns its path."""
         sphere = Sphere(LARGEST * self.height)
         if place == PATH:

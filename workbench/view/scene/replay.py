@@ -129,7 +129,7 @@ class Scene:
         """In its own colours, or in a house colour and alpha. A mesh is copied by the page, which has each file once."""
 
         def tint(rgba: Rgba) -> Rgba:
-            return rgba if house is None else _tinted(rgba, *house)
+            return rgba if house is None else _tint(rgba, *house)
 
         if shape.mesh is None:
             self.meshcat.SetObject(path, shape.shape, tint(shape.rgba))
@@ -147,7 +147,7 @@ class Scene:
         for foot, force in forces.items():
             link, p_LF = self.shapes.feet[foot]
             p, R = played.in_world(link)
-            f = _averaged(since_start(take), np.nan_to_num(force), played.time)
+            f = _average(since_start(take), np.nan_to_num(force), played.time)
             length = np.linalg.norm(f, axis=1) / per_metre
             at, radius = f"/{prefix}/{foot}", 0.04 * self.shapes.height
             self._add_arrow(at, radius)
@@ -218,7 +218,7 @@ def _pointing(force: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=2)
 
 
-def _averaged(clock: Array, values: Array, time: Array) -> Array:
+def _average(clock: Array, values: Array, time: Array) -> Array:
     """Mean of `values` (N, k) around each frame, as contact forces chatter faster than a film can show."""
     half = 0.5 * (time[1] - time[0]) if len(time) > 1 else 0.0
     total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
@@ -227,7 +227,7 @@ def _averaged(clock: Array, values: Array, time: Array) -> Array:
     return np.asarray((total[last] - total[first]) / (last - first)[:, None], dtype=float)
 
 
-def _tinted(rgba: Rgba, colour: str, alpha: float) -> Rgba:
+def _tint(rgba: Rgba, colour: str, alpha: float) -> Rgba:
     """The house colour, lighter or darker as the part is."""
     shade = 0.6 + 0.5 * (0.299 * rgba.r() + 0.587 * rgba.g() + 0.114 * rgba.b())
     r, g, b = (min(1.0, shade * c) for c in rgb(colour))

@@ -29,9 +29,9 @@ class Cycles(ctypes.Structure):
     limit: int
     wish: int
 
-    def attach(self, uc: unicorn.Uc, compiled: bool = True) -> None:
+    def attach(self, uc: unicorn.Uc) -> None:
         """Has every block of code counted."""
-        hook = _library() if compiled else None
+        hook = _library()
         if hook is None:
             uc.hook_add(unicorn.UC_HOOK_BLOCK, self._block)
             return

@@ -16,12 +16,12 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
 
     patience = 3.0
 
-    def __init__(self, board: Board, rate: int = 57_600) -> None:
+    def __init__(self, board: Board) -> None:
         super().__init__("virtual CM-530")
         self.board = board
         self._read = 0
         self.clearPort()
-        self.setupPort(rate)
+        self.setupPort(57_600)
 
     def setupPort(self, cflag_baud: int) -> bool:
         """The board's link has one rate; a wrong one reads as silence here."""

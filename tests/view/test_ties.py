@@ -1,0 +1,40 @@
+"""The page of a diagnosis whose cause angles do not tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from tests.example_diagnosis import diagnosis, finding
+from tests.view_takes import small_robot
+from workbench.cli.diagnose import finding_line
+from workbench.identify.results.findings import Alternative, Estimate
+from workbench.identify.results.tied_names import GravityOverTorque, TiedName
+from workbench.view.report.diagnosis import diagnosis_report
+from workbench.view.report.servo_law import tied_in_short
+from workbench.view.report.words import headline
+
+
+def test_a_tie_of_gravity_and_torque_leads_and_its_names_have_their_own_share(tmp_path: Path) -> None:
+    model = small_robot(tmp_path)
+    names = tuple(TiedName(effect, (where,), {}, f"It is {effect}.", behind)
+                  for effect, where, behind in (
+                      ("parallel_spring", "flm", 0.0), ("payload", "FLmid", 3.0), ("com_shift", "FLmid", 20.0)))
+    tie = GravityOverTorque(("flm",), Estimate(1.3, 1.22, 1.41, "1"), 0.98, names, True, 7.0)
+    spring = replace(finding("parallel_spring", 0.49), alternatives=(Alternative("payload", ("FLmid",), 0.49),), of_tie=0.98,
+                     parameters={"stiffness": Estimate(0.3, 0.2, 0.4, "N m/rad")})
+    found = replace(diagnosis(model), findings=(spring,), tied=(tie,))
+    assert headline(found) == ("A change of gravity over torque at flm (parallel spring at flm or payload at FLmid) explains all "
+                               "that the model missed.")
+    page = diagnosis_report(found, [], "Session small").html()
+    assert "Gravity over torque in flm is 1.30 (1.22 to 1.41) times that of the earlier model. Angles alone do not tell" in page
+    assert page.index("What angles do not tell apart") < page.index("<h2>Parallel spring at flm")
+    assert "49 %, or payload at FLmid 49 %; one of several names of gravity over torque, 98 % together" in page
+    assert "98 % sure that it is this" not in page
+    assert "(confidence 0.49, as one of several names of gravity over torque, 0.98 together" in finding_line(spring)
+
+
+def test_where_a_known_weight_leaves_one_cause_it_is_said() -> None:
+    names = (TiedName("payload", ("FLmid",), {}, "It is a payload.", 26.0),)
+    tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0)
+    assert tied_in_short(tie).endswith("times that of the files. Cause: other torques of the servo.")

@@ -1,0 +1,71 @@
+"""Tables that are not written as tables are: why they are not read, and how to mend them."""
+
+from __future__ import annotations
+
+import re
+
+from workbench.files.numerals import number_of
+from workbench.files.tables import is_binary, split_row
+
+_MOST = 60
+"""Lines among which a header is looked for."""
+_SEPARATORS = ((",", "commas"), (";", "';'"), ("\t", "tabs"), ("|", "'|'"), (None, "blanks"))
+
+
+def odd_table(head: bytes) -> str | None:
+    """Cause and remedy for a text that begins with `head` and is no table as it stands; None where nothing tells."""
+    if is_binary(head):
+        return _odd_bytes(head)
+    text = head.decode("utf-8-sig", "replace")
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        return "the file holds blank lines alone"
+    if lines[0].lstrip().startswith("{") and len(lines) > 1 and lines[1].lstrip().startswith("{"):
+        return "JSON lines, one object for each row: write CSV with pandas' read_json(FILE, lines=True).to_csv(..., index=False)"
+    return _header_below(text.splitlines()) or _transposed(lines)
+
+
+def _odd_bytes(head: bytes) -> str | None:
+    """Of a file with NUL bytes that is text all the same."""
+    quarter = max(len(head) // 4, 1)
+    ends = {k: head[k:4 * quarter:4].count(0) / quarter for k in range(4)}
+    if sum(share > 0.9 for share in ends.values()) == 3:
+        return "text in UTF-32; save it as UTF-8"
+    if min(ends[1], ends[3]) > 0.9 or min(ends[0], ends[2]) > 0.9:
+        return "text in UTF-16 without its byte order mark; save it as UTF-8"
+    first = head.find(b"\0")
+    before = head[:first]
+    readable = sum(32 <= b < 127 or b in b"\r\n\t" for b in before)
+    if first > 200 and readable > 0.97 * first and b"\n" in before:
+        line = before.count(b"\n") + 1
+        return (f"line {line}: bytes that are no text (NUL), the first at byte {first}: the disk or card was not written to the "
+                "end, or the power went; delete them and keep the whole rows")
+    return None
+
+
+def _header_below(lines: list[str]) -> str | None:
+    """Of a table whose header stands below other lines, or whose cells another character separates."""
+    for n, line in enumerate(lines[:_MOST]):
+        for mark, name in _SEPARATORS:
+            cells = split_row(line) if mark == "," else [c.strip().strip('"') for c in line.strip(" |").split(mark)]
+            if len(cells) < 2 or not _names_a_log(cells):
+                continue
+            above = f"line {n + 1} is the header: delete the {n} line(s) above it" if n else ""
+            other = f"{name} between the columns: write commas" if name in ("'|'", "blanks") else ""
+            return "; ".join(text for text in (above, other) if text) or None
+    return None
+
+
+def _names_a_log(cells: list[str]) -> bool:
+    lower = [c.lower() for c in cells]
+    return any(re.fullmatch(r"time.*|t|timestamp.*|frame", c) for c in lower) and \
+        any(re.search(r"goal|position|action|command|target|\.q[wxyz]$", c) for c in lower)
+
+
+def _transposed(lines: list[str]) -> str | None:
+    rows = [split_row(line) for line in lines[:4]]
+    names = sum(number_of(row[0]) is None for row in rows)
+    numbers = all(len(row) > 8 and all(number_of(c) is not None for c in row[1:] if c) for row in rows)
+    if len(rows) > 2 and names == len(rows) and numbers:
+        return "a table with its channels in rows: transpose it, one column for each channel"
+    return None
