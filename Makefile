@@ -31,7 +31,7 @@ test: lint compiled
 
 # Types and the quick tests once more, with the newest Python here and the newest Drake, numpy and MuJoCo that pyproject.toml allows,
 # in an environment of its own. Left out are tests of the search alone: long, and of our own arithmetic.
-NEWEST_LEFT_OUT := tests/identify tests/compare tests/experiment tests/diagnose tests/gait tests/test_concealed_effects*.py tests/test_stud*.py
+NEWEST_LEFT_OUT := tests/identify tests/compare tests/experiment tests/diagnose tests/gait tests/studies
 
 test-newest: pyproject.toml
 ifeq ($(NEWEST),)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.emulated_loader import POWERED_ON, Controller, EmulatedLoader
 from tests.firmware.image import Robot, image, needs_compiler
 from workbench.device.controller.loader import (
     ASKED,
@@ -23,7 +24,6 @@ from workbench.device.controller.loader import (
 )
 from workbench.device.controller.loader_profile import check_image, load_loader_profile
 from workbench.device.link import ControllerState
-from workbench.device.virtual.loader import POWERED_ON, Controller, EmulatedLoader
 from workbench.files import InputError
 
 PROFILE = load_loader_profile()
