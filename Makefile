@@ -13,7 +13,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: firmware demo compiled test test-newest lint docs prove studies system clean
+.PHONY: firmware demo compiled test test-newest lint docs prove mutants studies system clean
 
 demo: $(STAMP) compiled
 	$(BIN)/workbench demo
@@ -31,7 +31,7 @@ test: lint compiled
 
 # Types and the quick tests once more, with the newest Python here and the newest Drake, numpy and MuJoCo that pyproject.toml allows,
 # in an environment of its own. Left out are tests of the search alone: long, and of our own arithmetic.
-NEWEST_LEFT_OUT := tests/identify tests/compare tests/experiment tests/diagnose tests/gait tests/test_concealed_effects*.py tests/test_stud*.py
+NEWEST_LEFT_OUT := tests/identify tests/compare tests/experiment tests/diagnose tests/gait tests/studies
 
 test-newest: pyproject.toml
 ifeq ($(NEWEST),)
@@ -59,6 +59,13 @@ prove: $(STAMP)
 	$(BIN)/python -m tests.rude.prove --workers $(WORKERS)
 	$(BIN)/python -m studies.concealed_effects --workers $(WORKERS)
 
+# Mutants of the code that decides (modules and tests in pyproject.toml, [tool.mutmut]): five minutes of processor. It works in
+# mutants/; called again, it continues. The score and the survivors: docs/validation.md.
+mutants: $(STAMP)
+	$(BIN)/python -m pip install --quiet "mutmut>=3.8,<4"
+	$(BIN)/mutmut run --max-children $(WORKERS)
+	$(BIN)/mutmut results
+
 # Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`;
 # learned_gait needs the extra [learn].
 STUDIES := $(filter-out concealed_effects replay,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
@@ -77,5 +84,5 @@ $(STAMP): pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-newest runs dist build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) .venv-newest mutants runs dist build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

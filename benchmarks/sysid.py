@@ -126,8 +126,8 @@ def _fitted(mine: Session, evidence: list[TakeEvidence], iterations: int) -> Our
     evaluator = RolloutEvaluator(evidence, CONFIG, 1)
     search = Search(evaluator, mine.model)
     pool = {c.name: c for c in candidates(mine.model, evidence) if c.joint == ODD}
-    start = search.evaluated([(pool[name], np.zeros(1)) for name in ("coulomb_friction", "viscous_friction")])
-    return _told(evaluator, search.refitted(start, search.fitted, iterations))
+    start = search.evaluate([(pool[name], np.zeros(1)) for name in ("coulomb_friction", "viscous_friction")])
+    return _told(evaluator, search.refit(start, search.fitted, iterations))
 
 
 def _refined(mine: Session, evidence: list[TakeEvidence], fit: Fit) -> Ours:

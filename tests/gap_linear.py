@@ -51,7 +51,7 @@ class LinearSearch:
         self.asked += len(questions)
         return [{0: (self.recorded - self.sum(q.model))[:, None]} for q in questions]
 
-    def evaluated(self, sizes):
+    def evaluate(self, sizes):
         left = (self.recorded - self.sum(sizes))[:, None]
         cost = float(np.sum(left**2))
         x = np.concatenate([np.empty(0), *(x for _, x in sizes)])
@@ -59,12 +59,12 @@ class LinearSearch:
 
     def evaluating(self, *lists):
         yield []
-        return [self.evaluated(sizes) for sizes in lists]
+        return [self.evaluate(sizes) for sizes in lists]
 
     def refitting(self, fit, takes, steps):
         yield []
         A = np.column_stack([d for c in fit.effects for d in self.does[c.name]])
-        return self.evaluated(fit.sizes(np.linalg.lstsq(A, self.recorded, rcond=None)[0]))
+        return self.evaluate(fit.sizes(np.linalg.lstsq(A, self.recorded, rcond=None)[0]))
 
     def side_by_side(self, parts):
         return [self.run(p) for p in parts]

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.common import ROOT, run_study
-from studies.sts3215.sessions import CASES, SPLITS, Case, write_session
+from studies.sts3215.sessions import CASES, SPLITS, Case, is_recorded, write_session
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
@@ -65,17 +65,25 @@ def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outc
     said = [f for f in diagnosis.findings if f.confidence >= SAID]
     named = [f for f in said if f.effect in case.effects]
     false = tuple(f.effect for f in said if f.effect not in case.effects)
-    ties = [t for t in diagnosis.tied
-            if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
+    if case.loaded is None:
+        ties = [t for t in diagnosis.tied
+                if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
+        measured = [t for t in ties if t.since]
+    else:  # the known weight leaves the servo's torques as the only cause
+        measured = ties = [t for t in diagnosis.tied if t.may_be_torque and not t.competitive]
     size, value = None, None
     if case.moment is not None:
-        value = next((float(t.ratio.value) for t in ties if t.since), None)  # type: ignore[arg-type]
+        value = next((float(t.ratio.value) for t in measured), None)  # type: ignore[arg-type]
         size = None if value is None else abs(value - case.moment) <= case.within * abs(case.moment - 1.0)
     elif named:
         value = next((float(v.value) for v in named[0].parameters.values() if not isinstance(v.value, tuple)), None)
         size = None if value is None else abs(value - case.size) <= case.within * abs(case.size)
-    quiet = not said and not any(t.since for t in diagnosis.tied)
-    rightly = bool(named or ties) if case.effects else quiet
+    if case.loaded is not None:
+        rightly = not said and bool(ties)
+    elif case.effects:
+        rightly = bool(named or ties)
+    else:
+        rightly = not said and not any(t.since for t in diagnosis.tied)
     return Outcome(case.name, since, diagnosis.findings, diagnosis.tied, rightly, bool(named), false, value, size, seconds)
 
 
@@ -115,8 +123,10 @@ def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) 
     wanted = [c for c in cases[1:] if not args.only or c.name in args.only]
     if not quick:
         wanted = [replace(c, name=f"{c.name}, {split}", programmes=SPLITS[split]) for split in args.splits for c in wanted]
+        wanted = [c for c in wanted if is_recorded(args.data, c)]
     for case in wanted:
-        for previous, since in ((known, SINCE), (None, ALONE))[:1 if args.since_only else 2]:
+        ways = ((known, SINCE), (None, ALONE))[:1 if args.since_only else 2] if case.loaded is None else ((None, ALONE),)
+        for previous, since in ways:
             folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
             outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress, args.memory))
     (out / "outcomes.json").write_text(json.dumps([o.to_json() for o in outcomes], indent=1))

@@ -6,7 +6,7 @@ A pendulum that one Feetech STS3215 swings (kscalelabs/sysid, commit ca1ecb1), o
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,7 +69,8 @@ class Case:
     """One session. recorded: rig and repetition of the logs; told: the rig that the session describes. gain: by which the told
     gain is larger than the servo's; edit: applied to a log's rows. effects: names that describe the change rightly; size: of the
     first number of the first of them, in the unit of docs/formats.md; moment: instead of a size, the true gravity over torque
-    relative to the described rig; within: share of the size, or of the change of `moment`, within which an answer is right."""
+    relative to the described rig; within: share of the size, or of the change of `moment`, within which an answer is right.
+    loaded: a heavier rig whose logs are in the session too, with the weight that it carries more declared as `load:`."""
 
     name: str
     recorded: str
@@ -83,6 +84,7 @@ class Case:
     within: float = 0.05
     gains: Sequence[int] = GAINS
     programmes: Sequence[str] = SPLITS["first"]
+    loaded: str | None = None
 
 
 def commands_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
@@ -112,23 +114,43 @@ CASES = (
     Case("delay", "arm150_0.741kg", 2, edit=commands_at(0.04), effects=("command_delay",), size=0.04),
     Case("clock", "arm150_0.741kg", 2, edit=commands_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
     Case("zero", "arm150_0.741kg", 2, edit=turned(3.0), effects=("zero_offset", "ground_tilt"), size=-3.0),
+    Case("known weight", "arm150_0.741kg", moment=0.40, within=0.2, loaded="arm150_0.969kg"),
 )
 
 
-def write_session(folder: Path, data: Path, case: Case) -> Path:
-    """Writes robot.sdf, servo.yaml, session.yaml and the logs that had to be edited; returns session.yaml."""
-    folder, takes = folder.resolve(), []
+def is_recorded(data: Path, case: Case) -> bool:
+    """Whether the folder holds the logs of a case's programmes; two of the rigs played only those of the first split."""
+    rigs = [case.recorded] if case.loaded is None else [case.recorded, case.loaded]
+    return all((data / f"{rig}_kp{gain}_{programme}_{case.repetition}.json").exists()
+               for rig in rigs for gain in case.gains for programme in case.programmes)
+
+
+def _takes(folder: Path, data: Path, case: Case, recorded: str, more: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Entries of session.yaml for the logs of a rig; edited logs are written into the folder."""
+    takes = []
     for gain in case.gains:
         for programme in case.programmes:
-            name = f"{case.recorded}_kp{gain}_{programme}_{case.repetition}"
+            name = f"{recorded}_kp{gain}_{programme}_{case.repetition}"
             path = data.resolve() / f"{name}.json"
             if not path.exists():
                 raise InputError(path, "expected a log of the STS3215 rigs")
             if case.edit is not None:
                 content = json.loads(path.read_text())
                 path = write_whole(folder / path.name, json.dumps(content | {"entries": case.edit(content["entries"])}))
-            takes.append({"name": f"{programme}_{gain}", "recording": str(path), "base": "fixed",
-                          "servos": {"proportional_gain": case.gain * gain * DUTY_PER_UNIT}})
+            takes.append({"name": f"{programme}_{gain}{'_loaded' if more else ''}", "recording": str(path), "base": "fixed",
+                          "servos": {"proportional_gain": case.gain * gain * DUTY_PER_UNIT}, **more})
+    return takes
+
+
+def write_session(folder: Path, data: Path, case: Case) -> Path:
+    """Writes robot.sdf, servo.yaml, session.yaml and the logs that had to be edited; returns session.yaml."""
+    folder = folder.resolve()
+    takes = _takes(folder, data, case, case.recorded, {})
+    if case.loaded is not None:
+        more, told = RIGS[case.loaded], RIGS[case.told]
+        mass = more.mass - told.mass
+        at = [0.0, 0.0, -round((more.moment - told.moment) / 9.81 / mass, 5)]
+        takes += _takes(folder, data, case, case.loaded, {"load": {"link": ARM, "mass": round(mass, 5), "at": at}})
     write_whole(folder / "robot.sdf", RIGS[case.told].sdf)
     servo = SERVO | {"proportional_gain": case.gain * case.gains[-1] * DUTY_PER_UNIT}
     write_whole(folder / "servo.yaml", yaml.safe_dump(servo, sort_keys=False))

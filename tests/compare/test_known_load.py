@@ -12,8 +12,8 @@ from tests.servo_rig import SDF
 from workbench.compare.session import load_session
 from workbench.effects.apply import physics_of
 from workbench.files import InputError
-from workbench.motion.commands import Commands
 from workbench.recording import write_joint_log
+from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.robot import ServoConstants
 from workbench.simulation import Job, SimulationConfig
 from workbench.simulation.batch import run_job
@@ -35,7 +35,7 @@ def session(folder, **takes):
 def test_an_arm_hangs_lower_by_the_weight_that_a_take_declares(tmp_path):
     s = session(tmp_path, bare={}, loaded={"load": {"link": "arm", "mass": 0.3, "at": [0, 0, -0.15]}})
     goal = 0.5
-    commands = Commands.from_log(np.array([0.0, 2.0]), ("j",), np.full((2, 1), goal))
+    commands = commands_of_rows(np.array([0.0, 2.0]), ("j",), np.full((2, 1), goal))
     stiffness, config = SERVO.gain * SERVO.torque_at_full_duty, SimulationConfig(base="fixed", contact_period=0, settle=0.1)
     for take, moment in zip(s.takes, (0.2 * 0.1, 0.2 * 0.1 + 0.3 * 0.15)):
         q = run_job(Job(s.model_of(take), replace(config, engine="drake"), commands, 2.0)).q[-1, 0]

@@ -5,7 +5,7 @@ import socket
 import threading
 import time
 
-from workbench.device.capture import VirtualMotive
+from workbench.device.virtual.motive import VirtualMotive
 
 NAMES = tuple(f"body{i}" for i in range(14))
 

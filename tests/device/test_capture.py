@@ -14,10 +14,11 @@ import pytest
 
 from tests.command import refused, succeeds
 from tests.device.motive import NAMES, MotiveOnSockets, scene
-from workbench.device.capture import Faults, Recorder, UdpLink, VirtualLink, VirtualMotive, finish, record_take
+from workbench.device.capture import Recorder, UdpLink, finish, record_take
 from workbench.device.capture.journal import Journal
-from workbench.device.capture.ledger import Ledger
 from workbench.device.capture.packets import BrokenPacketError, parse_frame, parse_server_info
+from workbench.device.capture.stream import Stream
+from workbench.device.virtual.motive import Faults, VirtualLink, VirtualMotive
 from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 
@@ -154,12 +155,13 @@ def test_random_packets_end_nothing(tmp_path):
     assert finish(tmp_path / "t.natnet", tmp_path / "t.csv").counts.received >= before.received
 
 
-def test_the_ledger_tells_late_from_lost_from_doubled():
-    ledger = Ledger()
-    assert [ledger.frame(n) for n in (10, 11, 13, 12, 13, 17, 90_000)] == ["new", "new", "new", "late", "doubled", "new", "far"]
-    ledger.broken(15)
-    ledger.broken(13)
-    counts = ledger.counts()
+def test_late_lost_and_doubled_frames_are_told_apart():
+    stream = Stream()
+    assert [stream.count(n) for n in (10, 11, 13, 12, 13, 17, 90_000)] == [True, True, True, True, False, True, False]
+    assert (stream.jumps, stream.jumped_to) == (1, 90_000)
+    stream.count_broken(15)
+    stream.count_broken(13)
+    counts = stream.counts()
     assert (counts.first, counts.last, counts.received, counts.late, counts.doubled) == (10, 17, 5, 1, 1)
     assert (counts.broken, counts.lost) == (2, 2), "14 and 16; 15 came, though broken"
 

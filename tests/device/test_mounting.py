@@ -207,7 +207,7 @@ def test_wrong_keys_are_named(tmp_path, keys, said):
 
 
 def test_a_robotis_file_is_read_by_the_mounting(tmp_path):
-    from tests.test_motion_mtn import GOOD, write
+    from tests.motion.test_mtn import GOOD, write
 
     plain = load_mtn(write(tmp_path, GOOD)).motion("go", {"b": 1, "a": 2})
     turned = load_mtn(write(tmp_path, GOOD)).motion("go", {"b": 1, "a": 2}, {"a": Mounting(-1)})

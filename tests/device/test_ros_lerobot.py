@@ -12,8 +12,9 @@ from tests.command import succeeds
 from tests.device.motive import NAMES, scene
 from tests.device.servos import arm, robot
 from workbench.device.bus.survey import survey
-from workbench.device.capture import Recorder, VirtualLink, VirtualMotive, record_take
+from workbench.device.capture import Recorder, record_take
 from workbench.device.play import PlayOptions, perform
+from workbench.device.virtual.motive import VirtualLink, VirtualMotive
 from workbench.files import InputError
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
@@ -102,6 +103,13 @@ def test_a_played_motion_becomes_joint_states_and_a_trajectory(tmp_path):
     write_rosbag(written, folder, BEGAN)
     (tmp_path / "other").mkdir()
     with pytest.raises(InputError, match="already exists and is not a bag"):
+        write_rosbag(written, tmp_path / "other", BEGAN)
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="holds more than one"):
+        write_rosbag(written, folder, BEGAN)
+    assert (folder / "notes.txt").read_text() == "mine"
+    (tmp_path / "other" / "metadata.yaml").write_text("title: photographs\n")
+    with pytest.raises(InputError, match="is not a bag"):
         write_rosbag(written, tmp_path / "other", BEGAN)
 
 

@@ -16,9 +16,9 @@ OPTIONS = EvidenceOptions()
 N = 1600
 
 
-def fitted(sd, size, alike=1.0):
+def fitted(sd, size, alike=1.0, name="ground_tilt"):
     """A tilt that acts as torque, apart from a part at right angles to it; a unit of it equals 0.1 of the logarithm."""
-    tilt = candidate("ground_tilt")
+    tilt = candidate(name)
     here = replace(region([tilt]), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(1)
     torque, other = rng.normal(size=(2, N)) * 0.02
@@ -34,7 +34,7 @@ def test_what_the_motors_tolerance_covers_is_no_load():
     here, f, c = fitted(sd=0.5, size=3.0)
     tie = as_torque(here, OPTIONS, f, c)
     assert tie.by == pytest.approx(0.3)
-    assert tie.alike == pytest.approx(1.0)
+    assert tie.similarity == pytest.approx(1.0)
     assert tie.share < 0.1
     assert "35 % more" in tie.sentence
     assert "known weight" in tie.sentence
@@ -53,6 +53,27 @@ def test_the_share_is_that_of_the_prior_odds():
         prior.precision(f.hypothesis.theta)[own])
     effect = density + log_odds(1, OPTIONS.expected) + 0.5 * len(H) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(H)[1]
     assert as_torque(here, OPTIONS, f, c).share == pytest.approx(1 / (1 + np.exp(-0.5 * 2.0**2 - effect)))
+
+
+def test_the_share_depends_on_the_candidates_and_on_where_the_torque_is_already():
+    here, f, c = fitted(sd=0.1, size=2.0)
+    here = replace(here, candidates=(c,) * 6)
+    moved = f.hypothesis.theta.copy()
+    moved[0] = 0.5
+    f = replace(f, hypothesis=f.hypothesis.at(moved))
+    prior, own = Prior.of(f.hypothesis, OPTIONS), f.hypothesis.slices()[0]
+    nothing = moved.copy()
+    nothing[own] = prior.center[own]
+    H = (f.J[:, own].T * here.likelihood.precision(f.r, f.discrepancy)) @ f.J[:, own] + np.diag(prior.precision(moved)[own])
+    effect = (prior.at_center[own].sum() + prior.log(moved) - prior.log(nothing) + log_odds(6, OPTIONS.expected)
+              + 0.5 * len(H) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(H)[1])
+    torque = -0.5 * ((0.5 + 2.0) ** 2 - 0.5**2)  # the prior's standard deviation is half of the change that the tilt resembles
+    assert as_torque(here, OPTIONS, f, c).share == pytest.approx(1 / (1 + np.exp(torque - effect)))
+
+
+def test_an_effect_of_no_tie_is_compared_with_no_torque():
+    here, f, c = fitted(sd=0.5, size=3.0, name="coulomb_friction")
+    assert as_torque(here, OPTIONS, f, c) is None
 
 
 def test_what_does_something_else_is_tied_to_nothing():

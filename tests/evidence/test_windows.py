@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.servo_rig import rig_model
-from workbench.identify.rollouts.windows import recorded_states
-from workbench.motion.commands import Commands
+from workbench.identify.rollouts.windows import recorded_states, states_at
+from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, ServoConstants
 from workbench.simulation import SimulationConfig
@@ -31,7 +31,7 @@ class Log:
 
 def goals():
     time = np.arange(0.0, 3.0, 0.01)
-    return Commands.from_log(time, ("j",), (1.1 * np.sin(2.2 * time) + 0.5 * np.sin(7.0 * time))[:, None])
+    return commands_of_rows(time, ("j",), (1.1 * np.sin(2.2 * time) + 0.5 * np.sin(7.0 * time))[:, None])
 
 
 def angles(model, restarts=None, commands=None, times=TIMES):
@@ -75,3 +75,15 @@ def test_a_joint_that_was_not_seen_is_left_alone(tmp_path, late):
     model, unseen = rig_model(tmp_path, SERVO), np.full((1, 1), np.nan)
     put = angles(model, JointStates(np.array([1.0 + late]), unseen, unseen))
     np.testing.assert_allclose(put, angles(model), atol=1e-9)
+
+
+def test_a_sensor_with_its_own_clock_does_not_spoil_the_speed_of_a_steady_swing():
+    time = np.arange(0.0, 6.0, 0.01)
+    held = np.floor((time + 1.3e-3) / 8e-3) * 8e-3  # refreshed every 8 ms, read every 10 ms
+    position, speed = (f(held if f is np.sin else time) for f in (np.sin, np.cos))
+    at = np.arange(0.5, 5.5, 0.5)
+    _, told = states_at(time, 4.0 * position, at)
+    narrow = [np.polynomial.polynomial.polyfit(time[near] - t, 4.0 * position[near], 3)[1]
+              for t in at for near in [np.abs(time - t) <= 0.03 + 1e-9]]
+    true = 4.0 * np.interp(at, time, speed)
+    assert np.abs(told - true).max() < 0.3 * np.abs(narrow - true).max()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -36,6 +37,20 @@ def test_two_builds_in_two_places_give_the_same_small_image(tmp_path: Path) -> N
     stack = int(re.search(r"deepest stack: (\d+) bytes", said)[1])
     assert text + data == len(image)
     assert data + bss + stack < LIMIT
+
+
+@needs_compiler
+def test_the_image_is_the_one_that_is_stated(tmp_path: Path) -> None:
+    """A change of the program states its new image in firmware/image.txt: what `make firmware` prints."""
+    stated = dict(re.findall(r"^([\w -]+): (.+)$", (FIRMWARE / "image.txt").read_text(), re.MULTILINE))
+    version = subprocess.run(["arm-none-eabi-gcc", "-dumpversion"], check=True, capture_output=True, text=True).stdout.strip()
+    if f"arm-none-eabi-gcc {version}" != stated["compiler"]:
+        pytest.skip(f"stated for {stated['compiler']}, here is {version}")
+    image, said = build(tmp_path)
+    assert len(image) == int(stated["bytes"])
+    for name in ("deepest stack", "SHA-256"):
+        assert f"{name}: {stated[name]}" in said
+    assert hashlib.sha256(image).hexdigest() == stated["SHA-256"]
 
 
 @needs_compiler

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import random
 import struct
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.emulated_loader import POWERED_ON, Controller, EmulatedLoader
 from tests.firmware.image import Robot, image, needs_compiler
 from workbench.device.controller.loader import (
     ASKED,
@@ -22,7 +24,6 @@ from workbench.device.controller.loader import (
 )
 from workbench.device.controller.loader_profile import check_image, load_loader_profile
 from workbench.device.link import ControllerState
-from workbench.device.virtual.loader import POWERED_ON, Controller, EmulatedLoader
 from workbench.files import InputError
 
 PROFILE = load_loader_profile()
@@ -211,6 +212,7 @@ def test_flash_builds_and_says_what_it_would_do_and_needs_a_yes(tmp_path: Path, 
     assert "The robot will move" in out
     assert "ends after 5 cycles" in out
     assert "no port was opened" in out
+    assert f"SHA-256: {hashlib.sha256((tmp_path / 'cm530.bin').read_bytes()).hexdigest()}" in out
     assert main(["flash", walk, "--out", str(tmp_path)]) == 2
     assert "say yes" in capsys.readouterr().err
     assert main(["flash", walk, "--yes", "--port", "/dev/no-such-port", "--out", str(tmp_path)]) == 2

@@ -220,7 +220,7 @@ def test_a_trimmed_gait_is_certified_for_the_robot_that_was_recorded(made, tmp_p
     gait = read_gait(folder / "gait.csv", machine.model)
     assert gait.shape == table.shape
     quick = replace(OPTIONS, draws=0, watched=0, variants=("2 ms",))
-    recorded = RecordedTurn(math.radians(12), math.radians(1), 1.0, 8)
+    recorded = RecordedTurn(math.radians(12), math.radians(1), 1.0, 8, 0.2)
     done = trim(machine, gait, recorded, load_ensemble(), quick, lambda what, done: None)
     assert done.turn < 0
     assert abs(done.expected) < math.radians(2)

@@ -5,10 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.gait.draws import FEWEST, Drawn, bound, described, draw_margins, drawn, screened_count, summary
+from workbench.gait.draws import (
+    FEWEST,
+    Drawn,
+    bound,
+    described,
+    draw_margins,
+    drawn,
+    foot_speed,
+    screened_count,
+    slip_margin,
+    summary,
+)
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.feet import FeetMeasure
-from workbench.gait.limits import allowed_rms
+from workbench.gait.limits import Margin, allowed_rms
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
 from workbench.gait.request import Request
@@ -117,6 +128,19 @@ def test_a_draw_is_named_with_what_happened():
     assert touched.measure.touched
     assert not fell.measure.touched
     assert told["falls"] == 1
+
+
+def test_slip_is_a_share_of_the_speed_at_which_feet_pass_under_the_body(machine):
+    walk, turn, limits = Request(), Request(way="turn"), Request().limits
+    assert slip_margin(machine, walk, WALKED) == Margin("slip", "robot", pytest.approx(10.0), 100 * limits.slip, "% of the speed",
+                                                        pytest.approx(0.1 / limits.slip))
+    assert slip_margin(machine, walk, WALKED, 0.5).limit == 50.0
+    unseen = slip_margin(machine, walk, replace(WALKED, slip=np.nan))
+    assert unseen == Margin("slip", "robot", 0.0, 100 * limits.slip, "% of the speed", 0.0)
+    turning = replace(WALKED, velocity=(0.0, 0.0), turn_rate=-2.0)
+    assert foot_speed(machine, turn, turning) == pytest.approx(2.0 * machine.arm)
+    assert foot_speed(machine, walk, replace(WALKED, velocity=(0.3, -0.4))) == pytest.approx(0.5)
+    assert slip_margin(machine, turn, turning).value == pytest.approx(100 * 0.03 / (2.0 * machine.arm))
 
 
 def test_a_draw_has_the_clearance_and_slip_of_its_feet():

@@ -15,7 +15,15 @@ from workbench.gait.optimize import OptimizeOptions
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.shape import GaitShape
-from workbench.gait.straighten import METRES, Straightener, heading_gain, summary_of_straightened, turned_by
+from workbench.gait.straighten import (
+    LEAST_GAIN_SPREAD,
+    METRES,
+    Straightener,
+    TurnResponse,
+    summary_of_straightened,
+    turn_response,
+    turned_by,
+)
 from workbench.gait.table import gait_table
 from workbench.gait.trim import turn_in
 from workbench.gait.turning import MOST_TRIM, TurnEstimate, recorded_turn
@@ -50,6 +58,7 @@ def test_recorded_heading_is_that_of_the_walk_between_its_rests():
     assert math.degrees(turn.heading) == pytest.approx(30, abs=1)
     assert turn.metres == pytest.approx(0.6, abs=0.1)
     assert turn.cycles >= 6
+    assert turn.speed == pytest.approx(0.2, rel=0.05)
 
 
 def test_gaps_do_not_matter_and_too_short_a_walk_is_refused():
@@ -75,14 +84,14 @@ def test_estimate_weighs_the_recording_by_its_scatter_and_learns_the_gain():
 
 def test_a_crooked_robot_is_straightened_by_what_it_records(machine):
     request = Request()
-    gain, speed = heading_gain(machine, request, SHAPE)
-    walks = Straightener(machine.model, request, SHAPE, speed, gain, 0.8, SEARCH.time_step).robots(
+    response = turn_response(machine, request, SHAPE)
+    walks = Straightener(machine.model, request, SHAPE, response, 0.8, SEARCH.time_step).robots(
         [machine.model.with_effects((CROOKED,))])
     degrees = np.degrees(walks[0])
     assert len(degrees) == METRES + 1
     assert abs(degrees[0]) > 10
     assert abs(degrees[METRES]) < 3
-    assert summary_of_straightened(walks, gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
+    assert summary_of_straightened(walks, response.nominal_gain)["untrimmed deg/m RMS"] == pytest.approx(abs(degrees[0]))
 
 
 def test_turn_is_taken_back_as_far_as_legs_reach(machine):
@@ -94,7 +103,20 @@ def test_turn_is_taken_back_as_far_as_legs_reach(machine):
 
 def test_a_turn_in_place_has_nothing_to_straighten(machine):
     with pytest.raises(InputError, match="no heading to straighten"):
-        heading_gain(machine, Request(way="turn"), SHAPE)
+        turn_response(machine, Request(way="turn"), SHAPE)
+
+
+def test_a_slow_robot_turns_farther_in_a_metre_for_the_same_change(machine):
+    response = TurnResponse(rate=4.0, speed=0.2, share=0.8)
+    assert response.nominal_gain == pytest.approx(20.0)
+    assert response.gain(0.2) == pytest.approx(16.0)
+    assert response.gain(0.1) == pytest.approx(32.0)
+    robot = machine.model.with_effects((EffectSpec("ground_friction", (), {"friction": 0.3}),))
+    alone, told = turn_response(machine, Request(), SHAPE), turn_response(machine, Request(), SHAPE, [robot] * 4)
+    assert (alone.share, alone.rate) == (1.0, told.rate)
+    assert told.share == pytest.approx(turn_response(GaitMachine(robot), Request(), SHAPE).rate / alone.rate)
+    assert abs(told.share - 1) > 0.02
+    assert told.sd == LEAST_GAIN_SPREAD
 
 
 def record(path, robot, commands, seconds):

@@ -20,7 +20,7 @@ def friction(worn):
 
 
 def fitted(search, friction):
-    return search.refitted(search.evaluated([(friction, np.ones(friction.size))]), search.fixed_base, 4)
+    return search.refit(search.evaluate([(friction, np.ones(friction.size))]), search.fixed_base, 4)
 
 
 def test_friction_that_stays_shows_no_drift(worn, friction):

@@ -107,7 +107,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     best = max(trials, key=lambda t: t.gain["choose"])
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)
-    refined = search.refined(search.refitted(search.evaluated([(best.candidate, best.x)]), (0,), 2))
+    refined = search.refined(search.refit(search.evaluate([(best.candidate, best.x)]), (0,), 2))
     noise = np.count_nonzero(search.evaluator.vector(nominal.residuals, "validate"))
     assert refined.cost["validate"] - noise < 0.2 * (nominal.cost["validate"] - noise)
     (sd,) = np.sqrt(np.diag(refined.covariance))
@@ -202,16 +202,16 @@ def test_what_fixed_base_takes_identified_keeps_its_numbers_beside_what_is_fitte
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
     pool = {c.key: c for c in candidates(session.model, evidence)}
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
-    told = search.refitted(search.evaluated([(first, np.array([1.0]))]), (0,), 2)
+    told = search.refit(search.evaluate([(first, np.array([1.0]))]), (0,), 2)
     search = search.with_settled(told)
-    both = search.refitted(search.evaluated([(second, np.array([0.3])), *told.sizes()]), (0,), 2)
+    both = search.refit(search.evaluate([(second, np.array([0.3])), *told.sizes()]), (0,), 2)
     assert both.x[1] == told.x[0]
     assert both.covariance[1, 1] == told.covariance[0, 0]
     assert np.isinf(both.covariance[0, 1])
     assert both.x[0] != 0.3
     assert [s.numbers.tolist() for s in both.slopes] == [[0], [1]]
     np.testing.assert_array_equal(both.slopes[1].J, told.slopes[0].J)
-    search, alone = search.resettled(search.evaluated([(second, np.array([0.1]))]), second)
+    search, alone = search.resettle(search.evaluate([(second, np.array([0.1]))]), second)
     assert [c.key for c in search.settled.effects] == [second.key]
     assert alone.x == pytest.approx(search.settled.x)
 
@@ -227,10 +227,10 @@ def test_most_from_floating_when_commands_come_unless_fixed_base_takes_speak_aga
         fixed_base=(0,),
         fitted=(0, 1),
         floating_base=lambda takes: (1,),
-        refitted=lambda *_: fit(3.4, left),
+        refit=lambda *_: fit(3.4, left),
         evaluator=SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values()))),
     )
-    assert Search.with_timing_refitted(search, fit(2.5, 10.0)).x.tolist() == [late]
+    assert Search.refit_timing(search, fit(2.5, 10.0)).x.tolist() == [late]
 
 
 def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
@@ -239,12 +239,12 @@ def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
     zero = Candidate.of(known_effects()["zero_offset"], ("one",), (0.0,))
     before = search.evaluator.rollouts
-    fit = search.refitted(search.evaluated([(first, np.array([1.3])), (second, np.array([0.2]))]), (0,), 1)
+    fit = search.refit(search.evaluate([(first, np.array([1.3])), (second, np.array([0.2]))]), (0,), 1)
     assert search.evaluator.rollouts - before == 3  # as they are, both moved, where that leads
     assert [(s.joint, s.numbers.tolist()) for s in fit.slopes] == [("three", [0]), ("two", [1])]
     assert np.isfinite(np.diag(fit.covariance)).all()
     assert 0.06 + first.values(fit.x[:1])[0] == pytest.approx(HIDDEN, rel=0.1)
-    mixed = search.refitted(search.evaluated([(first, fit.x[:1]), (zero, np.array([0.1]))]), (0,), 1)
+    mixed = search.refit(search.evaluate([(first, fit.x[:1]), (zero, np.array([0.1]))]), (0,), 1)
     assert [s.joint for s in mixed.slopes] == [None]  # its own joint does not show it
 
 
@@ -252,10 +252,10 @@ def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
     session, search, _ = worn
     (e,) = search.evaluator.evidence
     effect = next(c for c in candidates(session.model, (e,)) if c.key == ("coulomb_friction", ("three",)))
-    alike = search.refitted(search.evaluated([(effect, np.array([2.0]))]), (0,), 2)
+    alike = search.refit(search.evaluate([(effect, np.array([2.0]))]), (0,), 2)
     assert not e.contact.any()
-    moved = search.evaluated([(effect, alike.x + 0.5)]).residuals[0] - alike.residuals[0]
+    moved = search.evaluate([(effect, alike.x + 0.5)]).residuals[0] - alike.residuals[0]
     differing = Search(search.evaluator.on([replace(e, contact=np.nan_to_num(moved) * e.sigma)]), session.model)
-    unsure = differing.refitted(differing.evaluated([(effect, np.array([2.0]))]), (0,), 2)
+    unsure = differing.refit(differing.evaluate([(effect, np.array([2.0]))]), (0,), 2)
     assert unsure.x == pytest.approx(alike.x)
     assert np.sqrt(unsure.covariance[0, 0] - alike.covariance[0, 0]) == pytest.approx(0.5, rel=0.15)

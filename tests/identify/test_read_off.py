@@ -189,10 +189,10 @@ def test_what_was_taken_for_missed_is_read_anew_from_what_fixed_base_takes_ident
     evaluator = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
     wrong = DroppedCommands("dropped_command", "one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
     search = Search(played_without(evaluator, {(0, "one"): (1,)}), quiet[0])
-    current = search.evaluated([(slow, x)])
+    current = search.evaluate([(slow, x)])
     search, played = reestimate(search, current, TakesAsPlayed(evaluator, (wrong,)))
     assert played.missed == ()
-    assert search.evaluator.cost(search.evaluated([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
+    assert search.evaluator.cost(search.evaluate([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
     assert search.evaluator.evidence[0].take.commands is evaluator.evidence[0].take.commands
 
 

@@ -85,6 +85,20 @@ def test_goals_and_positions_in_each_others_columns(tmp_path: Path) -> None:
     assert np.isfinite(log.channels["position.knee"]).any()
 
 
+@pytest.mark.parametrize(("goals", "said"), [
+    (lambda goal, _: np.append(goal[:1], np.diff(goal)), "looks like the change of the position"),
+    (lambda goal, position: goal - position, "looks like the way from the position to the goal"),
+])
+def test_relative_goals_of_steps(tmp_path: Path, goals: Callable[[np.ndarray, np.ndarray], np.ndarray], said: str) -> None:
+    time = np.arange(8 * RATE) / RATE
+    steps = np.random.default_rng(3).uniform(-25, 25, 20)[(time / 0.5).astype(int)]
+    steps[:50] = 0
+    position = np.round(np.convolve(np.concatenate([np.zeros(14), steps]), np.ones(15) / 15, "valid") / COUNT) * COUNT
+    sound = {"time": time, "goal.hip": steps, "position.hip": position}
+    assert not any("relative" in text for text in _problems(tmp_path, _text(sound)))
+    assert any(said in text for text in _problems(tmp_path, _text(sound | {"goal.hip": goals(steps, position)})))
+
+
 def test_a_pause_is_no_jump_of_the_zero(tmp_path: Path) -> None:
     columns = _columns()
     kept = np.r_[0:250, 330:600]

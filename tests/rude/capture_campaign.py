@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.device.capture import Recorder, VirtualLink, VirtualMotive, record_take
+from workbench.device.capture import Recorder, record_take
 from workbench.device.capture.packets import Message
 from workbench.device.capture.recorder import RecordOptions
+from workbench.device.virtual.motive import VirtualLink, VirtualMotive
 from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 

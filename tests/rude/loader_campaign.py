@@ -10,9 +10,9 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from tests.firmware.emulated_loader import Controller, EmulatedLoader
 from workbench.device.controller.loader import ASKED, HALF, LOADED, UNKNOWN, UNTOUCHED, LoadError, Loading, Transcript
 from workbench.device.controller.loader_profile import load_loader_profile
-from workbench.device.virtual.loader import Controller, EmulatedLoader
 
 PROFILE = load_loader_profile()
 IMAGE = struct.pack("<II", 0x20010000, 0x08003101) + random.Random(0).randbytes(600)

@@ -4,8 +4,8 @@ import json
 import sys
 from unittest.mock import patch
 
+from tests.firmware.emulated_loader import Controller
 from tests.rude import capture_campaign, loader_campaign, prove
-from workbench.device.virtual.loader import Controller
 
 
 def test_what_is_said_of_the_controller_is_true_whatever_happens_on_the_line():

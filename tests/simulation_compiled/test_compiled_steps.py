@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from studies.concealed_effects.robots import quadruped
+from tests.effects.test_structure import ARM, INERTIAL
 from tests.shared_data import practice
 from tests.simulation_compiled.drake_steps import CompiledSteps, config_for, drake_steps, typical
-from tests.test_effects_structure import ARM, INERTIAL
 from workbench.compare.session import load_session
 from workbench.effects.registry import known_effects
 from workbench.robot import Ground, RobotModel, ServoConstants, data_file, load_model, puppy_model

@@ -35,3 +35,10 @@ def test_pieces_with_late_servos_are_as_in_drake() -> None:
     assert ours.shape == drakes.shape
     assert ours == pytest.approx(drakes, abs=1e-9)
     assert np.hypot(*ours[-1, :2]) > 0.01
+
+
+def test_a_take_before_the_first_piece_is_refused() -> None:
+    config = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=2e-3)
+    for run in (CompiledSteppedRun(puppy_model(), config), Simulation(puppy_model(), config).stepped()):
+        with pytest.raises(RuntimeError, match="call advance"):
+            run.take()

@@ -10,6 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
+import yaml
+
 from workbench.files import InputError
 from workbench.files.reading import write_together
 from workbench.files.resources import resource_dir
@@ -162,5 +164,5 @@ def _relative(path: str | Path, out: Path) -> str:
 
 
 def _quoted(text: str) -> str:
-    plain = all(c.isalnum() or c in "_./-" for c in text) and text[:1].isalpha()
+    plain = all(c.isalnum() or c in "_./-" for c in text) and text[:1].isalpha() and yaml.safe_load(text) == text  # not null, yes
     return text if plain else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -11,11 +11,12 @@ from workbench.compare.options import COMPARE
 from workbench.compare.session_file import write_session
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import family_of, survey
-from workbench.device.capture import Capture, Recorder, VirtualLink, VirtualMotive, record_take
+from workbench.device.capture import Capture, Recorder, record_take
 from workbench.device.capture.background import BackgroundRecording
 from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
 from workbench.device.tables.table_file import table_file
+from workbench.device.virtual.motive import VirtualLink, VirtualMotive
 from workbench.files import InputError
 from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel

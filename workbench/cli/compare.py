@@ -6,6 +6,7 @@ import argparse
 
 from workbench.cli.check import add_yes, check_files, check_session, say_left_out
 from workbench.cli.options import PUPPY, add_cycles, add_engine, add_model, add_out, load_model, positive
+from workbench.cli.torque_log import report_torque_logs, torque_logs
 
 STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
 
@@ -19,7 +20,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "other, and writes comparison.json and report.html: error of each joint and of the body's path, with the recording's "
         "noise, the simulation's numerical floor and the spread between contact models.",
     )
-    parser.add_argument("a", metavar="SESSION|A", help="session.yaml or its folder; or a recording, motion or rollout")
+    parser.add_argument("a", metavar="SESSION|A", help="session.yaml or its folder; a recording, motion or rollout; or a log of "
+                        "angles and torques without goals, weighed against --model")
     parser.add_argument("b", metavar="B", nargs="?", help="what to compare A with: a recording, motion or rollout")
     add_model(parser, "the session's own; of two files, the bundled puppy")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
@@ -44,6 +46,9 @@ def run(args: argparse.Namespace) -> int:
     from workbench.simulation import SimulationConfig
     from workbench.view.report.comparison import write_comparison
 
+    if torque_logs([args.a, args.b]):
+        files = [file for file in (args.a, args.b) if file is not None]
+        return report_torque_logs("compare", files, load_model(args.model, args.packages), args.out)
     config = SimulationConfig(contact=args.contact, engine="drake")
     told: frozenset[str] = frozenset()
     with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:

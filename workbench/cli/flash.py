@@ -59,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"workbench flash: warning: {violation}", file=sys.stderr)
     table = program.table.table
     ends = f"ends after {program.table.cycles} cycles" if program.table.stops else "repeats until a person stops it"
-    print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints; it {ends}")
+    print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints; it {ends}\n"
+          f"SHA-256: {program.sha256}")
     if not profile.confirmed:
         print(f"workbench flash: warning: the texts in {profile.source} are not confirmed on a real controller, "
               "and those after LOAD are unpublished; it stops at the first that differs (see the transcript)", file=sys.stderr)

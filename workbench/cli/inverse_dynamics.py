@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 
 from workbench.cli.check import add_yes, check_files, check_session
 from workbench.cli.options import PUPPY, add_cycles, add_model, add_out, load_model
+from workbench.cli.torque_log import report_torque_logs, torque_logs
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,12 +38,11 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
     from workbench.dynamics import save_inverse_dynamics
-    from workbench.dynamics.torque_log import is_torque_log
     from workbench.view.figures import save_figure
     from workbench.view.report.forces import force_figures, margin_table
 
-    if not args.take and is_torque_log(args.input):
-        return _torque_log(args)
+    if not args.take and torque_logs([args.input]):
+        return report_torque_logs("inverse-dynamics", [args.input], load_model(args.model, args.packages), args.out)
     if args.take:
         check_session("inverse-dynamics", load_session(args.input), args.yes)
     else:
@@ -64,25 +63,4 @@ def run(args: argparse.Namespace) -> int:
         print(f"workbench inverse-dynamics: warning: {problem}", file=sys.stderr)
     print(margin_table(result))
     print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
-    return 0
-
-
-def _torque_log(args: argparse.Namespace) -> int:
-    """The torque gap of a log that holds torques and no goals, on a base that is held."""
-    from workbench.cli.output import output_directory
-    from workbench.cli.progress import Progress
-    from workbench.dynamics.torque_gap import summary, torque_gap
-    from workbench.dynamics.torque_log import read_torque_log
-    from workbench.files.reading import write_whole
-
-    model = load_model(args.model, args.packages)
-    log = read_torque_log(args.input, model)
-    with output_directory(args.out) as folder, Progress("inverse-dynamics", stages=("inverse dynamics",)) as progress:
-        progress("inverse dynamics")
-        gap = torque_gap(log, model)
-        write_whole(folder / "torque_gap.json", json.dumps(summary(gap), indent=2, allow_nan=False) + "\n")
-    if gap.assumed:
-        print(f"workbench inverse-dynamics: warning: {gap.assumed}", file=sys.stderr)
-    print(gap.table())
-    print(f"wrote {args.out}: torque_gap.json")
     return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,26 +45,36 @@ class Load:
 
 @dataclass(frozen=True)
 class TorqueGap:
-    """joints: by gap, the largest first. load: None where no load explains a tenth of the gap. assumed: as of TorqueLog."""
+    """joints: by gap, the largest first. load: None where no load explains a tenth of the gap. assumed: as of TorqueLog. time:
+    (N,) [s] of the rows that were evaluated; torque, required: (N, n) [N m], recorded and by the model, of the joints
+    `columns`."""
 
     joints: tuple[JointGap, ...]
     load: Load | None
     assumed: str = ""
+    time: Array = field(default_factory=lambda: np.empty(0))
+    columns: tuple[str, ...] = ()
+    torque: Array = field(default_factory=lambda: np.empty((0, 0)))
+    required: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def table(self) -> str:
         """A line for each joint, and one for the load."""
         lines = ["joint             torque   gap    mean   with load [N m, RMS]"]
         lines += [f"{g.joint:16s} {g.recorded:7.3f} {g.gap:6.3f} {g.mean:+7.3f}  {g.with_load:6.3f}" for g in self.joints]
+        return "\n".join([*lines, self.load_line()])
+
+    def load_line(self) -> str:
+        """The load in one sentence."""
         if self.load is None:
-            return "\n".join([*lines, "no single load explains a tenth of the gap"])
+            return "no single load explains a tenth of the gap"
         x, y, z = (1000 * p for p in self.load.position)
-        load = f"a load of {1000 * self.load.mass:.0f} g at ({x:.0f}, {y:.0f}, {z:.0f}) mm of {self.load.link}"
-        return "\n".join([*lines, f"{load} explains {100 * self.load.explains:.0f} % of it (besides dry friction)"])
+        return (f"a load of {1000 * self.load.mass:.0f} g at ({x:.0f}, {y:.0f}, {z:.0f}) mm of {self.load.link} explains "
+                f"{100 * self.load.explains:.0f} % of it (besides dry friction)")
 
 
-def torque_gap(log: TorqueLog, model: RobotModel) -> TorqueGap:
-    """The gap of a robot whose base is held level, and the load on one link that explains most of it, beside dry friction of
-    each joint as large as the gap shows."""
+def torque_gap(log: TorqueLog, model: RobotModel, link: str | None = None) -> TorqueGap:
+    """The gap of a robot whose base is held level, and the load on one link (that given, or any) that explains most of it,
+    together with dry friction of each joint as large as the gap shows."""
     path = _path(log, model)
     columns = [model.joints.index(j) for j in log.joints]
     rows = np.unique(np.linspace(0, len(log.time) - 1, _ROWS).astype(int))
@@ -75,10 +85,10 @@ def torque_gap(log: TorqueLog, model: RobotModel) -> TorqueGap:
     friction = _friction(path.v[:, columns])
     best: Load | None = None
     rest = gap
-    for link in model.kinematics.links:
-        if link == model.base:
+    for candidate in model.kinematics.links if link is None else (link,):
+        if candidate == model.base:
             continue
-        found = _load(model, link, path, required, columns, gap, friction)
+        found = _load(model, candidate, path, required, columns, gap, friction)
         if found is not None and (best is None or found[0].explains > best.explains):
             best, rest = found
     if best is None or best.explains < 0.1:
@@ -86,7 +96,23 @@ def torque_gap(log: TorqueLog, model: RobotModel) -> TorqueGap:
     rms = [np.sqrt(np.mean(x**2, axis=0)) for x in (log.torque[kept], gap, rest)]
     joints = [JointGap(j, float(rms[0][i]), float(rms[1][i]), float(gap[:, i].mean()), float(rms[2][i]))
               for i, j in enumerate(log.joints)]
-    return TorqueGap(tuple(sorted(joints, key=lambda g: -g.gap)), best, log.assumed)
+    return TorqueGap(tuple(sorted(joints, key=lambda g: -g.gap)), best, log.assumed, log.time[kept], log.joints, log.torque[kept],
+                     required[:, columns])
+
+
+def compared(logs: Mapping[str, TorqueLog], gaps: Mapping[str, TorqueGap], model: RobotModel) -> str:
+    """The additional load of the second of two logs against the first, in a sentence, both weighed on the link that explains
+    the larger gap: errors of the model, equal in both, cancel. Empty for one log, or where neither shows a load."""
+    if len(logs) != 2:
+        return ""
+    found = [gap.load for gap in gaps.values() if gap.load is not None]
+    if not found:
+        return ""
+    link = max(found, key=lambda load: load.mass).link
+    first, second = (torque_gap(log, model, link).load for log in logs.values())
+    a, b = (0.0 if load is None else load.mass for load in (first, second))
+    names = list(logs)
+    return f"{names[1]} carries {1000 * (b - a):+.0f} g against {names[0]}, weighed on {link}"
 
 
 def _path(log: TorqueLog, model: RobotModel) -> RobotTrajectory:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -28,6 +29,10 @@ PLAY_DAMPING = 5e-4
 it along with a mere 1.5 mN m."""
 DRAKE = "{http://drake.mit.edu}"
 
+KEPT = 64
+"""Kinematic trees that are kept."""
+_kinematics: OrderedDict[tuple[object, ...], Kinematics] = OrderedDict()
+
 
 class SdfRobot:
     """An SDF file in memory; each method changes one thing about the robot. Lengths m, angles rad.
@@ -46,6 +51,7 @@ class SdfRobot:
             raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
         self._model = model
         self.stages: dict[str, tuple[str, ...]] = {}
+        self._built: list[object] = [path, path.stat().st_mtime_ns]
         self.moved = self.ends = False
         self._link_of = {j.get("name", ""): j.findtext("child", "").strip() for j in model.findall("joint")}
 
@@ -55,6 +61,15 @@ class SdfRobot:
             if uri.text and "://" not in uri.text:  # of a text without a file Drake takes neither relative nor absolute paths
                 uri.text = f"file://{(self.path.parent / uri.text.strip()).resolve()}"
         return ElementTree.tostring(self.root, encoding="unicode")
+
+    def kinematics(self) -> Kinematics:
+        """Of the robot as it is now, but for its masses; parsed once for the same changes of joints and lengths."""
+        key = tuple(self._built)
+        if key not in _kinematics:
+            _kinematics[key] = Kinematics.from_text(self.text(), self.path)
+            while len(_kinematics) > KEPT:
+                _kinematics.popitem(last=False)
+        return _kinematics[key]
 
     def add_play(self, joint: str, gap: float) -> None:
         """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""
@@ -67,7 +82,7 @@ class SdfRobot:
 
     def add_loose_mount(self, joint: str, play: float, axis: Array) -> None:
         """The link turns freely by `play` in all about `axis` (3,), in the link's frame, through the joint's origin."""
-        frame = Kinematics.from_text(self.text(), self.path).frames[joint]
+        frame = self.kinematics().frames[joint]
         across = np.asarray(axis) / np.linalg.norm(axis) if np.any(axis) else np.zeros(3)
         if not np.linalg.norm(np.cross(across, frame.axis_B)) > 0.02:
             raise InputError(self.source, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
@@ -88,6 +103,7 @@ class SdfRobot:
         set_child(limit, "lower", lower)
         set_child(limit, "upper", upper)
         self.ends = True
+        self._built.append((joint, lower, upper))
 
     def add_parallel_spring(self, joint: str, stiffness: float) -> None:
         """A spring [N m/rad] across the servo's joint, at rest in neutral, beside one that the file may give it."""
@@ -116,7 +132,7 @@ class SdfRobot:
     def lengthen(self, link: str, change: float) -> None:
         """The way from the link's joint to the next longer by `change`: what hangs on it moves along; of a last link, its foot
         does. The next of several is their mean. The link's inertia stays."""
-        k = Kinematics.from_text(self.text(), self.path)
+        k = self.kinematics()
         way = self.way(k, link)
         length = float(np.linalg.norm(way))
         if length < 1e-6 or length + change <= 0:
@@ -128,6 +144,7 @@ class SdfRobot:
         if following:
             self._place_links(k, {f.child for f in following}, link, shift)
         self.moved = True
+        self._built.append((link, change))
 
     def way(self, k: Kinematics, link: str) -> Array:
         """From a link's joint to the next, of several to their mean, of a last link to its foot: (3,) [m], in its frame.
@@ -194,6 +211,7 @@ class SdfRobot:
         if not before:
             self._keep_apart(joint)
         self.stages[joint] = (*before, name)
+        self._built.append((name, None if xyz is None else ElementTree.tostring(xyz), limits))
 
     def _keep_apart(self, joint: str) -> None:
         """Neighbours do not collide in Drake; with a gear between them they would."""

@@ -28,7 +28,7 @@ from workbench.gait.requirements import direction_margins, drift, floor_margins,
 from workbench.gait.second_engine import conditions
 from workbench.gait.second_engine import margins as engine_margins
 from workbench.gait.second_engine import summary as engines_summary
-from workbench.gait.straighten import Straightener, heading_gain, summary_of_straightened, trim_margin
+from workbench.gait.straighten import PROBED, Straightener, summary_of_straightened, trim_margin, turn_response
 from workbench.gait.table import GaitTable
 from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
@@ -61,8 +61,9 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
     robots = [request.on_slope(d) for d in draws[:options.draws]]
     groups = _groups(robots)
-    straightener = _straightener(machine, request, table) if robots and options.trimmed else None
-    trimmed = _groups(robots[:options.trimmed]) if straightener is not None else []
+    probed = robots[-PROBED:] if len(robots) > 2 * PROBED else []  # others than those that are straightened
+    straightener = _straightener(machine, request, table, probed) if robots and options.trimmed else None
+    trimmed = _groups(robots[:min(options.trimmed, len(robots) - len(probed))]) if straightener is not None else []
     variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
     work: list[Work] = [("nominal robot", examiner.nominal, ())]
     work += [(f"numerics, {v}", examiner.variant, (v,)) for v in variants]
@@ -83,7 +84,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     walks = [w for group in results for w in group]
     told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if straightener is not None:
-        told["straightened"] = summary_of_straightened(walks, straightener.gain)
+        told["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
@@ -108,13 +109,14 @@ def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:
     return [robots[k:k + TOGETHER] for k in range(0, len(robots), TOGETHER)]
 
 
-def _straightener(machine: GaitMachine, request: Request, table: GaitTable) -> Straightener | None:
-    """What straightens robots that walk this table; None for a gait that cannot be steered."""
+def _straightener(machine: GaitMachine, request: Request, table: GaitTable, probed: Sequence[RobotModel]) -> Straightener | None:
+    """What straightens robots that walk this table; None for a gait that cannot be steered. probed: robots on which the
+    response is measured."""
     try:
-        gain, speed = heading_gain(machine, request, table.shape)
+        response = turn_response(machine, request, table.shape, probed)
     except InputError:
         return None
-    return Straightener(machine.model, request, table.shape, speed, gain, request.limits.spread)
+    return Straightener(machine.model, request, table.shape, response, request.limits.spread)
 
 
 def _take(results: Iterator[Any], count: int) -> list[Any]:

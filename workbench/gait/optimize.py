@@ -148,6 +148,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             certified.append(examine(walked, options.certify, k + 1))
             if certified[-1][1].certificate.kept:
                 return finished(True, "", *certified[-1], replace(found, best=walked))
+            progress(f"finalist {k + 1} is not certified: {binding(certified[-1][1].certificate.margins)}", None)
             if len(certified) == options.screening.certified:
                 break
         if certified:

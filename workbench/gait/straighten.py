@@ -7,20 +7,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from workbench.files import InputError
 from workbench.gait.evaluate import SEARCH, Evaluator
 from workbench.gait.limits import Margin, table_margins, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.request import Request
-from workbench.gait.requirements import drift
+from workbench.gait.requirements import SLOWEST, drift, excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
-from workbench.gait.turning import LEAST_SD, TurnEstimate, rms
+from workbench.gait.turning import GAIN_SPREAD, LEAST_SD, TurnEstimate, rms
 from workbench.robot import RobotModel
 
 PROBE = 0.02
 """Change of `turn` [rad] to either side, from whose effect on the nominal robot the gain is computed."""
+PROBED = 8
+"""Robots of the ensemble on which the response to `turn` is measured, in addition to the nominal one."""
+FEWEST_ROBOTS = 4
+"""Of those, from which the response of others is estimated."""
+LEAST_GAIN_SPREAD = 0.1
+"""Standard deviation of a robot's response, as a share, that is assumed at least."""
 METRES = 3
 """How many are recorded, one after the other, each with the motion that the one before led to."""
 LONGEST = 8.0
@@ -29,18 +37,48 @@ SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Of a change of `turn` that are tried until the table keeps its own limits."""
 
 
-def heading_gain(machine: GaitMachine, request: Request, shape: GaitShape, step: float = SEARCH.time_step) -> tuple[float, float]:
-    """Heading by distance that a change of `turn` gives the nominal robot [1/m], and its speed [m/s]. step: of the simulation
-    [s]. InputError for a turn in place, or a gait that falls, or one on which `turn` has no effect in the expected direction."""
+@dataclass(frozen=True)
+class TurnResponse:
+    """Effect of a change of `turn` on the rate of turning. rate: of the nominal robot [1/s]; speed: its speed [m/s]; share:
+    mean of other robots' rates, by the nominal one's; sd: standard deviation of a robot's rate, as a share of that mean."""
+
+    rate: float
+    speed: float
+    share: float = 1.0
+    sd: float = GAIN_SPREAD
+
+    @property
+    def nominal_gain(self) -> float:
+        """Heading by distance that a change of `turn` gives the nominal robot [1/m]."""
+        return self.rate / max(abs(self.speed), SLOWEST)
+
+    def gain(self, speed: float) -> float:
+        """Expected heading by distance for a change of `turn` [1/m] of a robot that walks at a speed [m/s]: a slow one takes more
+        cycles for a metre, and turns in each."""
+        return self.share * self.rate / max(abs(speed), SLOWEST)
+
+
+def turn_response(machine: GaitMachine, request: Request, shape: GaitShape, robots: Sequence[RobotModel] = (),
+                  step: float = SEARCH.time_step) -> TurnResponse:
+    """From two rollouts of the nominal robot, and of each of `robots`, which the ensemble has drawn: without FEWEST_ROBOTS of
+    them the response of others is taken to be the nominal one's. step: of the simulation [s]. InputError for a turn in place,
+    or a gait that falls, or one on which `turn` has no effect in the expected direction."""
     if request.way == "turn":
         raise InputError(None, "a turn in place has no heading to straighten; expected a gait that goes somewhere")
     evaluator = Evaluator(machine, request, (), n_jobs=1, config=replace(SEARCH, time_step=step))
     turned = [replace(shape, turn=shape.turn + change) for change in (-PROBE, PROBE)]
     right, left = evaluator.measured([(s, evaluator.nominal) for s in turned])
-    gain = (drift(request, left) - drift(request, right)) / (2 * PROBE)
-    if right.fell or left.fell or gain <= 0:
-        raise InputError(None, f"the gait does not answer to its turn (gain {gain:.2g} 1/m); expected one that can be steered")
-    return gain, (request.progress(left) + request.progress(right)) / 2
+    rate = (excess_turning(request, left) - excess_turning(request, right)) / (2 * PROBE)
+    if right.fell or left.fell or rate <= 0:
+        raise InputError(None, f"the gait does not answer to its turn ({rate:.2g} 1/s); expected one that can be steered")
+    speed = (request.progress(left) + request.progress(right)) / 2
+    others = evaluator.measured([(s, robot) for robot in robots for s in turned])
+    pairs = [(a, b) for a, b in zip(others[::2], others[1::2]) if not (a.fell or b.fell)]
+    shares = [(excess_turning(request, b) - excess_turning(request, a)) / (2 * PROBE * rate) for a, b in pairs]
+    if len(shares) < FEWEST_ROBOTS or not 0.2 < float(np.mean(shares)) < 5.0:
+        return TurnResponse(rate, speed)
+    mean = float(np.mean(shares))
+    return TurnResponse(rate, speed, mean, max(float(np.std(shares, ddof=1)) / mean, LEAST_GAIN_SPREAD))
 
 
 def turned_by(machine: GaitMachine, request: Request, shape: GaitShape, change: float) -> GaitShape:
@@ -65,30 +103,33 @@ def spread_of(m: GaitMeasure, request: Request, period: float) -> float:
 
 @dataclass(frozen=True)
 class Straightener:
-    """Robots that record a metre, are straightened, and record the next. speed [m/s] and gain [1/m] of the nominal robot; spread:
-    of headings over the ensemble [rad/m]. step: of the simulation [s]. Can be sent to a process."""
+    """Robots that record a metre, are straightened, and record the next. response: to a change of `turn`; spread: of headings
+    over the ensemble [rad/m]. step: of the simulation [s]. Can be sent to a process."""
 
     model: RobotModel
     request: Request
     shape: GaitShape
-    speed: float
-    gain: float
+    response: TurnResponse
     spread: float
     step: float = SEARCH.time_step
 
     def robots(self, robots: Sequence[RobotModel]) -> list[tuple[float, ...]]:
         """Heading by distance [rad/m] of each robot: untrimmed, and after each recorded metre; shorter where it fell."""
         machine = GaitMachine(self.model)
-        seconds = min(1.0 / max(abs(self.speed), 0.02), LONGEST)
+        seconds = min(1.0 / max(abs(self.response.speed), SLOWEST), LONGEST)
         evaluator = Evaluator(machine, self.request, (), n_jobs=1, config=replace(SEARCH, time_step=self.step), seconds=seconds)
         return [self._one(machine, evaluator, robot) for robot in robots]
 
     def _one(self, machine: GaitMachine, evaluator: Evaluator, robot: RobotModel) -> tuple[float, ...]:
-        estimate, shape, out = TurnEstimate.before(self.spread, self.gain), self.shape, []
+        estimate: TurnEstimate | None = None
+        shape, out = self.shape, list[float]()
         for metre in range(METRES + 1):
             (m,) = evaluator.measured([(shape, robot)])
             if m.fell:
                 break
+            if estimate is None:
+                gain = self.response.gain(self.request.progress(m))
+                estimate = TurnEstimate.before(self.spread, gain, self.response.sd)
             out.append(drift(self.request, m))
             if metre < METRES:
                 estimate = estimate.after(shape.turn - self.shape.turn, out[-1], spread_of(m, self.request, shape.period))

@@ -18,7 +18,7 @@ from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import curvature, drift
 from workbench.gait.shape import GaitShape
-from workbench.gait.straighten import heading_gain, turned_by
+from workbench.gait.straighten import PROBED, turn_response, turned_by
 from workbench.gait.table import GaitTable, gait_table
 from workbench.gait.turning import RecordedTurn, TurnEstimate, recorded_turn
 from workbench.recording.formats.read import read_recording
@@ -104,9 +104,12 @@ def trim(machine: GaitMachine, gait: Gait, recorded: RecordedTurn, ensemble: Ens
     side, and its draws scatter about that. InputError for a gait that cannot be steered."""
     request, shape = gait.request, gait.shape
     progress("how the gait answers to its turn", None)
-    gain, _ = heading_gain(machine, request, shape)
+    with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
+        others = [request.on_slope(r) for r in ensemble.draws(machine.model, PROBED, SEED + 1, Path(folder))]
+        response = turn_response(machine, request, shape, others)
     excess = recorded.heading - curvature(replace(request, bias=0.0))
-    estimate = TurnEstimate.before(request.limits.spread, gain).after(0.0, excess, recorded.sd)
+    estimate = TurnEstimate.before(request.limits.spread, response.gain(recorded.speed), response.sd)
+    estimate = estimate.after(0.0, excess, recorded.sd)
     turned = turned_by(machine, request, shape, estimate.turn)
     config = replace(SEARCH, time_step=options.step)
     evaluator = Evaluator(machine, request, (), n_jobs=1, config=config, seconds=options.seconds)

@@ -34,6 +34,7 @@ class RecordedTurn:
     sd: float
     metres: float
     cycles: int
+    speed: float
 
 
 def recorded_turn(time: Array, p: Array, heading: Array, period: float, source: str = "recording") -> RecordedTurn:
@@ -61,7 +62,7 @@ def recorded_turn(time: Array, p: Array, heading: Array, period: float, source: 
     path = np.stack([np.interp(ends, time, p[:, i]) for i in (0, 1)], axis=1)
     metres = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     scatter = float(np.std(np.diff(h), ddof=1)) * math.sqrt(count)
-    return RecordedTurn(float(h[-1] - h[0]) / metres, max(scatter / metres, LEAST_SD), metres, count)
+    return RecordedTurn(float(h[-1] - h[0]) / metres, max(scatter / metres, LEAST_SD), metres, count, metres / (count * period))
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,10 @@ class TurnEstimate:
     covariance: Array
 
     @staticmethod
-    def before(spread: float, gain: float) -> TurnEstimate:
-        """Before any recording. spread: of headings over the ensemble's robots [rad/m]; gain: of the nominal robot [1/m]."""
-        return TurnEstimate(np.array([0.0, gain]), np.diag([max(spread, LEAST_SD) ** 2, (GAIN_SPREAD * gain) ** 2]))
+    def before(spread: float, gain: float, share: float = GAIN_SPREAD) -> TurnEstimate:
+        """Before any recording. spread: of headings over the ensemble's robots [rad/m]; gain: expected [1/m]; share: its standard
+        deviation, by the gain."""
+        return TurnEstimate(np.array([0.0, gain]), np.diag([max(spread, LEAST_SD) ** 2, (share * gain) ** 2]))
 
     def after(self, turn: float, heading: float, sd: float) -> TurnEstimate:
         """After a recording. turn: change from the untrimmed gait's [rad]; heading, sd [rad/m]."""

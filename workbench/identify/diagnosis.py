@@ -119,7 +119,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     seen = prepare(session, takes, config, settings.n_jobs, progress)
     check_duration(session, seen.evidence)
     evaluator = RolloutEvaluator(seen.evidence, config, settings.n_jobs, settings.memory)
-    nominal = Search(evaluator, session.model).evaluated([])
+    nominal = Search(evaluator, session.model).evaluate([])
     progress("judging the engine", None)
     apart = {BESIDE_DRAKE.format("nominal"): judge_by_drake(evaluator, session.model, "nominal")}
 
@@ -134,7 +134,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     known = session.with_model(build.added_to(session.model))
     sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
     evidence = sent.evidence
-    begun = Search(sent, known.model).evaluated([])
+    begun = Search(sent, known.model).evaluate([])
     played = TakesAsPlayed(sent, without=settings.without)
     evaluator, missed = played.without_missed(known.model, begun.residuals)
     pool = build.asked(candidates(known.model, evidence)) + read_off_candidates(known.model, evidence, begun.residuals)
@@ -183,7 +183,7 @@ def _check_geometry(build: Geometry, evaluator: RolloutEvaluator, model: RobotMo
     with other missing effects even the right leg length may walk the wrong way."""
     if not build.measured:
         return build
-    there = Search(evaluator, build.added_to(model)).evaluated([])
+    there = Search(evaluator, build.added_to(model)).evaluate([])
     worse = (there.cost["fit"] + there.cost["choose"]) / (nominal.cost["fit"] + nominal.cost["choose"]) - 1.0
     return build if worse < READ_OFF.geometry_worse else replace(build, measured=())
 

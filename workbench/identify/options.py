@@ -32,9 +32,11 @@ class ProblemOptions:
     is estimated from a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
     pose_frames: int = 7
     """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
-    state_span: float = 0.06
-    """Span of the positions of a servo log from which the state at a window's start is estimated [s]: about a servo's rise
-    time."""
+    state_spans: tuple[float, ...] = (0.06, 0.08, 0.1, 0.14)
+    """Spans of the positions of a servo log from which the state at a window's start is estimated [s], from about a servo's rise
+    time. The widest whose speed agrees with every narrower one is used."""
+    state_agree: float = 2.0
+    """Standard errors within which these speeds agree."""
     state_order: int = 3
     """Of the polynomial through them: over so long a servo's acceleration changes."""
     states_kept: int = 256

@@ -38,26 +38,6 @@ class Commands:
         if np.any(np.diff(self.times) <= 0):
             raise InputError(None, "commands: times must increase")
 
-    @staticmethod
-    def from_log(time: Array, joints: tuple[str, ...], goals: Array,
-                 enabled: NDArray[np.bool_] | None = None) -> Commands:
-        """Commands of a log of goals. time: (N,) [s], increasing. goals: (N, n) [rad]. enabled: (N, n), default all.
-
-        Moving speed 0 (at once); samples that change nothing are left out; a goal that is NaN keeps the one before.
-        Time zero is the log's first sample. InputError where a joint's first goal is missing.
-        """
-        goals = np.asarray(goals, dtype=float)
-        on = np.ones(goals.shape, dtype=bool) if enabled is None else np.asarray(enabled, dtype=bool)
-        known = np.maximum.accumulate(np.where(np.isnan(goals), -1, np.arange(len(goals))[:, None]), axis=0)
-        if len(goals) == 0 or (known[0] < 0).any():
-            raise InputError(None, "commands: the first sample must hold a goal for each joint")
-        goals = np.take_along_axis(goals, known, axis=0)
-        new = np.ones(len(goals), dtype=bool)
-        new[1:] = ((np.diff(goals, axis=0) != 0) | (on[1:] != on[:-1])).any(axis=1)
-        since = np.asarray(time, dtype=float) - time[0]
-        return Commands(since[new], joints, goals[new], np.zeros_like(goals[new]), on[new], float(since[-1]),
-                        np.full(int(new.sum()), -1), begun=True)
-
     def reference(self, t: Array) -> Array:
         """The servos' ramped reference (N, n) [rad] at times t (N,), at first neutral (docs/formats.md, section 4)."""
         t = np.asarray(t, dtype=float)

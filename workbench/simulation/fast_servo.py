@@ -2,7 +2,7 @@
 
 Exact (up to the implicit step) for a proportional law without margin and punch: duty = clip(gain (ref - q), -1, 1). A
 compliance law is approximated by a line through its edge of saturation, which ignores margin and punch inside it; the error
-against the full law is measured by a test (tests/test_simulation_station.py).
+against the full law is measured by a test (tests/simulation/test_station.py).
 """
 
 from __future__ import annotations

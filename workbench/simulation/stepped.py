@@ -61,7 +61,9 @@ class SteppedRun:
         return self.state.base
 
     def take(self, name: str = "simulation") -> Take:
-        """The take logged so far, from the start of the run."""
+        """The take logged so far, from the start of the run; RuntimeError before the first `advance`."""
+        if not self._sampled:
+            raise RuntimeError("nothing was simulated yet: call advance() before take()")
         self._check_alive()
         sampled = np.concatenate([*self._sampled, np.empty(0)])
         unique, rows = np.unique(sampled, return_index=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.device.bus.survey import family_of
-from workbench.device.capture.virtual_motive import Pose, Scene
 from workbench.device.virtual import (
     AX12A,
     MX28,
@@ -23,6 +22,7 @@ from workbench.device.virtual import (
     VirtualPort,
     VirtualServo,
 )
+from workbench.device.virtual.motive import Pose, Scene
 from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of, resolved
 from workbench.effects.base import Effect
 from workbench.files import InputError

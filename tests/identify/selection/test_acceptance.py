@@ -38,7 +38,7 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
     residual = nominal.residuals[0].copy()
     residual[:, n] *= 30
     before = replace(nominal, residuals={0: residual})
-    search = search.with_settled(replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals))
+    search = search.with_settled(replace(search.evaluate([(taken, np.array([2.6]))]), residuals=nominal.residuals))
     first = SelectionStep(before, (), (CandidateFit(taken, np.array([2.6]), {"fit": 1e6, "choose": 1e6}, "three"),))
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
 
@@ -102,7 +102,7 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_fixed_base_takes_id
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = partial(leaving, worn)
     first = SelectionStep(fit(three=100.0, two=15.0), (), (CandidateFit(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
-    search = search.with_settled(replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals))
+    search = search.with_settled(replace(search.evaluate([(fade, np.ones(1))]), residuals=nominal.residuals))
     monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: True)
     assert not acceptance.too_little_left(search, fit(two=13.0), (0,), [first])
     assert acceptance.too_little_left(search, fit(three=13.0), (0,), [first])
@@ -181,7 +181,7 @@ def test_what_fine_steps_do_not_miss_is_idle_where_floating_base_takes_identifie
     search = Search(whole.evaluator, session.model)
     load = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.name == "payload")
     friction = Candidate.of(known_effects()["coulomb_friction"], ("three",), (0.06,))
-    fit = replace(search.evaluated([(load, np.ones(load.size)), (friction, np.ones(1))]), cost={"choose": 1e4})
+    fit = replace(search.evaluate([(load, np.ones(load.size)), (friction, np.ones(1))]), cost={"choose": 1e4})
     asked_without = []
 
     def finely(fit, takes, *points):

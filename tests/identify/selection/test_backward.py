@@ -20,16 +20,16 @@ class Search(LinearSearch):
 
     fixed_base = ()
 
-    def refitted(self, fit, takes, steps, free=None):
+    def refit(self, fit, takes, steps, free=None):
         end = self.run(self.refitting(fit, takes, steps))
-        return self.evaluated(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
+        return self.evaluate(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
 
 
 @pytest.mark.parametrize(("against", "stay"), [(False, set(FOUND)), (True, {"torque_ceiling", "payload"})])
 def test_a_load_takes_the_place_of_spring_and_zero_where_fixed_base_takes_contradict_these(monkeypatch, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
     monkeypatch.setattr(backward, "contradicted_by_fixed_base", lambda *a: against)
-    fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
+    fit = search.evaluate([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)
     assert {c.name for c in kept.effects} == stay
     assert kept.cost["choose"] < 1e-6
@@ -38,5 +38,5 @@ def test_a_load_takes_the_place_of_spring_and_zero_where_fixed_base_takes_contra
 def test_what_nothing_else_does_stays():
     hidden = {name: x for name, x in FOUND.items() if name != "payload"}
     search = Search(DOES, **hidden)
-    fit = search.evaluated([(candidate(name), np.array(x)) for name, x in hidden.items()])
+    fit = search.evaluate([(candidate(name), np.array(x)) for name, x in hidden.items()])
     assert without_idle(search, fit).effects == fit.effects

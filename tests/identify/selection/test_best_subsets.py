@@ -86,7 +86,7 @@ def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_fa
 
     search = SimpleNamespace(side_by_side=lambda parts: list(together(dict(enumerate(parts)), lambda wanted: []).values()),
                              evaluating=lambda *starts: asks_nothing([fit_at(s, 1e4) for s in starts]),
-                             refitting=lambda *a: asks_nothing(ended(*a)), refitted=ended)
+                             refitting=lambda *a: asks_nothing(ended(*a)), refit=ended)
     here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + FIT.least_gain * 3)
     there = begun_again(search, here, (0,), 9)
     assert (there is not here) is again

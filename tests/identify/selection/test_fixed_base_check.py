@@ -27,16 +27,16 @@ class TwoWorlds:
     def is_settled(self, c):
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
 
-    def evaluated(self, sizes):
+    def evaluate(self, sizes):
         size = next((float(x[0]) for c, x in sizes if c is CEILING), None)
         left = {i: np.array([[leaves(size)]]) for i, leaves in enumerate(self.leaves)}
         x = np.concatenate([np.empty(0), *(x for _, x in sizes)])
         return Fit(tuple(c for c, _ in sizes), x, np.eye(len(x)), {}, left)
 
-    def resettled(self, current, *more):
+    def resettle(self, current, *more):
         other = TwoWorlds(*self.leaves, self.tells)
-        other.settled = self.evaluated([(c, np.array([self.tells])) for c in more])
-        return other, self.evaluated([(c, np.array([self.tells]) if c in more else x) for c, x in current.sizes()])
+        other.settled = self.evaluate([(c, np.array([self.tells])) for c in more])
+        return other, self.evaluate([(c, np.array([self.tells]) if c in more else x) for c, x in current.sizes()])
 
 
 def held(size):
@@ -49,7 +49,7 @@ def held(size):
 def test_a_number_that_fixed_base_takes_contradict_is_theirs_where_walks_hardly_mind(there, size, settled):
     search = TwoWorlds(held, lambda x: {None: 49000.0, 1.42: 25600.0, 1.15: there}[x], 1.15)
     search, fit = checked_on_fixed_base(
-        search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING]
+        search, search.evaluate([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING]
     )
     assert fit.x.tolist() == [0.3, size]
     assert search.is_settled(CEILING) is settled
@@ -58,8 +58,8 @@ def test_a_number_that_fixed_base_takes_contradict_is_theirs_where_walks_hardly_
 
 def test_what_fixed_base_takes_do_not_contradict_or_would_rather_not_have_stays():
     near = TwoWorlds(held, lambda x: {None: 49000.0, 1.2: 25600.0}[x], 1.15)
-    assert checked_on_fixed_base(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
+    assert checked_on_fixed_base(near, near.evaluate([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
     never = TwoWorlds(lambda x: 26400.0 if x is None else 26800.0, lambda x: 49000.0 if x is None else 25600.0, 1.15)
-    same, fit = checked_on_fixed_base(never, never.evaluated([(CEILING, np.array([1.42]))]), [CEILING])
+    same, fit = checked_on_fixed_base(never, never.evaluate([(CEILING, np.array([1.42]))]), [CEILING])
     assert fit.x.tolist() == [1.42]
     assert same.settled is None

@@ -19,7 +19,7 @@ def test_across_its_axis_a_loose_link_may_lie_anywhere_in_its_play_and_nothing_e
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
     axis = (1.0, 0.0, 0.0)
     mount = Candidate.of(known_effects()["loose_mount"], ("two",), (0.0, *axis), (4.0, *axis), (True,) * 4)
-    fit = search.evaluated([(mount, EMPTY)])
+    fit = search.evaluate([(mount, EMPTY)])
     assert left_to_chance(search, fit, {mount.key}) == (search, fit)  # it was known
     wider, there = left_to_chance(search, fit, ())
     (e,) = wider.evaluator.evidence

@@ -34,14 +34,14 @@ from workbench.identify.selection.screening import fit_groups
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
     session, search, _ = worn
-    nominal = search.evaluated([])
+    nominal = search.evaluate([])
     pool = [c for c in candidates(session.model, search.evaluator.evidence)
             if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
     trials = [t for c in pool for t in fit_groups(search, nominal, [[c]], {0: (0,)}, lambda share: None)]
     trials.sort(key=lambda t: -t.gain["choose"])
     assert [t.candidate.name for t in trials] == ["coulomb_friction", "viscous_friction"]
     wrong = trials[1]
-    first = search.refitted(search.evaluated([(wrong.candidate, wrong.x)]), (0,), 1)
+    first = search.refit(search.evaluate([(wrong.candidate, wrong.x)]), (0,), 1)
     chosen = SelectionResult(search, first, (SelectionStep(nominal, tuple(trials), (wrong,)),))
     _, fit, posteriors = compare_models(search, chosen, lambda what, share: None)
     assert [str(c) for c in fit.effects] == ["coulomb_friction(three)"]
@@ -54,8 +54,8 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
 def test_what_leaves_much_at_its_place_is_less_sure(worn):
     session, search, _ = worn
     friction = next(c for c in candidates(session.model, search.evaluator.evidence) if c.key == ("coulomb_friction", ("three",)))
-    right = search.refitted(search.evaluated([(friction, np.array([1.0]))]), (0,), 3)
-    far = search.evaluated([(friction, 3.0 * right.x)])
+    right = search.refit(search.evaluate([(friction, np.array([1.0]))]), (0,), 3)
+    far = search.evaluate([(friction, 3.0 * right.x)])
     posteriors = [NamePosterior(0.9, (Rival(friction, right.x, 10.0, 0.08),))]
     floors = {0: np.zeros(len(search.evaluator.evidence[0].channels))}
     assert calibrate(search, right, posteriors, floors) == posteriors
@@ -69,7 +69,7 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
 def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill, sure):
     _, search, _ = worn
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
-    fit = replace(search.evaluated([(fade, np.array([1.0]))]), covariance=np.full((1, 1), np.inf))
+    fit = replace(search.evaluate([(fade, np.array([1.0]))]), covariance=np.full((1, 1), np.inf))
     e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, [e.channels.index(j) for j in ill]] = 4.0
@@ -84,7 +84,7 @@ def test_what_a_joint_lacks_is_for_its_own_effect_to_answer(worn, monkeypatch):
     monkeypatch.setattr(calibration, "SCHEDULING", replace(SCHEDULING, few=3))  # none of three may err for itself
     sag = Candidate.of(known_effects()["supply_sag"], (), (0.0,))
     stiff = Candidate.of(known_effects()["coulomb_friction"], ("one",), (NOMINAL,))
-    fit = replace(search.evaluated([(sag, np.ones(1)), (stiff, np.ones(1))]), covariance=np.full((2, 2), np.inf))
+    fit = replace(search.evaluate([(sag, np.ones(1)), (stiff, np.ones(1))]), covariance=np.full((2, 2), np.inf))
     e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, e.channels.index("one")] = 7.0
@@ -97,7 +97,7 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
     _, search, _ = worn
     floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
     x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
-    fit = replace(search.evaluated([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
+    fit = replace(search.evaluate([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
     (told,) = calibrate(search, fit, [NamePosterior(0.9, ())], {})
     assert floor.values(x)[0] == pytest.approx(friction)
     assert told.probability == pytest.approx(sure)
@@ -107,7 +107,7 @@ def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
     _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
-        fit = replace(search.evaluated([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
+        fit = replace(search.evaluate([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
         assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(sure)
 
 
@@ -117,7 +117,7 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
 
     def told(c, x, deviations):
-        fit = replace(search.evaluated([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))
+        fit = replace(search.evaluate([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))
         return calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability
 
     assert told(tilt, [0.1, 2.0], [0.5, 0.5]) == pytest.approx(0.9)
@@ -134,7 +134,7 @@ def test_a_load_that_may_weigh_nothing_is_another_centre_of_mass_where_that_stan
     beside = NamePosterior(0.6, (Rival(other, np.ones(3), 10.0, 0.3),))
 
     def told(deviations):
-        fit = replace(search.evaluated([]), effects=(mass,), x=np.array([0.4, 3.0, 0.0, 1.0]),
+        fit = replace(search.evaluate([]), effects=(mass,), x=np.array([0.4, 3.0, 0.0, 1.0]),
                       covariance=np.diag(np.square(deviations)))
         return calibrate(search, fit, [beside], {})[0].probability
 
@@ -149,7 +149,7 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
     link = k.frames["two"].child
     mass = PointMass.of(known_effects()["payload"], (link,), (0.0, *k.centers[link]))
     other = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
-    fit = search.evaluated([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
+    fit = search.evaluate([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
     astray = CandidateFit(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
     seen = []
     part = replace_effect(search, fit, 0, astray)
@@ -199,14 +199,14 @@ def test_fixed_base_takes_take_the_word_first_of_what_they_told(walks, adds):
 def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
     _, search, _ = worn
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
-    fit = replace(search.evaluated([]), effects=(mass,), x=np.ones(4), covariance=np.full((4, 4), np.inf))
+    fit = replace(search.evaluate([]), effects=(mass,), x=np.ones(4), covariance=np.full((4, 4), np.inf))
     assert numbers_identified(fit, 0) == 4
     assert numbers_identified(replace(fit, covariance=np.diag([1.0, 1.0, 1.0, np.inf])), 0) == 3
 
 
 def test_where_nothing_stays_nothing_is_compared(worn):
     _, search, _ = worn
-    nominal = search.evaluated([])
+    nominal = search.evaluate([])
     _, fit, posteriors = compare_models(search, SelectionResult(search, nominal, ()), lambda what, share: None)
     assert fit is nominal
     assert posteriors == []
@@ -238,7 +238,7 @@ def test_twins_name_each_other():
 def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):
     _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
-    fit = replace(search.evaluated([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
+    fit = replace(search.evaluate([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
     assert calibrate(search, fit, [NamePosterior(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
     assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.9)
 
@@ -248,7 +248,7 @@ def test_a_pull_straight_down_is_no_cable(worn, force, down):
     """A mass of 71 g that hangs below a body and swings was called a tether of (-0.02, 0.03, -0.75) N."""
     _, search, _ = worn
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
-    fit = replace(search.evaluated([]), effects=(tether,), x=tether.sizes(force), covariance=np.diag([1e-4] * 3))
+    fit = replace(search.evaluate([]), effects=(tether,), x=tether.sizes(force), covariance=np.diag([1e-4] * 3))
     assert calibrate(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
     left = list(downward_pulls(fit))
     assert bool(left) is down
@@ -262,7 +262,7 @@ def test_a_load_is_less_sure_where_a_pull_straight_down_is_about_as_likely(worn,
     _, search, _ = worn
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
-    fit = replace(search.evaluated([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
+    fit = replace(search.evaluate([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
     beside = NamePosterior(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
     assert calibrate(search, fit, [beside], {})[0].probability == pytest.approx(sure)
 

@@ -20,9 +20,9 @@ def found(search, name, *rivals, closed=0.6):
     """A fit with one effect as it is best alone, the round in which it was taken, and who else was fitted there."""
     def alone(n):
         c = candidate(n)
-        return search.run(search.refitting(search.evaluated([(c, np.ones(c.size))]), (0,), 1))
+        return search.run(search.refitting(search.evaluate([(c, np.ones(c.size))]), (0,), 1))
 
-    nominal, fit = search.evaluated([]), alone(name)
+    nominal, fit = search.evaluate([]), alone(name)
     trials = [CandidateFit(f.effects[0], f.x, {use: nominal.cost[use] - f.cost[use] for use in f.cost}, None, closed=closed)
               for f in map(alone, (name, *rivals))]
     return fit, SelectionStep(nominal, tuple(trials), (trials[0],))

@@ -16,13 +16,13 @@ DOES = {"supply_voltage": [0.8 * SAGS + 0.5 * SPRING + 0.3 * WEAK], "supply_sag"
 
 def explained(search, *names):
     """These effects fitted together."""
-    start = search.evaluated([(c, np.ones(c.size)) for c in map(candidate, names)])
+    start = search.evaluate([(c, np.ones(c.size)) for c in map(candidate, names)])
     return search.run(search.refitting(start, (0,), 1))
 
 
 def tried(search, name, closed=0.4):
     """An effect fitted alone."""
-    fit, nominal = explained(search, name), search.evaluated([])
+    fit, nominal = explained(search, name), search.evaluate([])
     return CandidateFit(fit.effects[0], fit.x, {use: nominal.cost[use] - fit.cost[use] for use in fit.cost}, None, closed=closed)
 
 
@@ -30,7 +30,7 @@ def rounds_of(search, closed=0.4):
     """The weak supply taken first, a spring then."""
     weak, others = tried(search, "supply_voltage", closed), [tried(search, n) for n in ("supply_sag", "thermal_fade")]
     spring = tried(search, "parallel_spring")
-    return [SelectionStep(search.evaluated([]), (weak, *others), (weak,)),
+    return [SelectionStep(search.evaluate([]), (weak, *others), (weak,)),
             SelectionStep(explained(search, "supply_voltage"), (spring,), (spring,))]
 
 

@@ -110,7 +110,7 @@ def test_where_no_rival_is_predicted_enough_the_best_of_those_near_it_are_fitted
 def test_what_an_earlier_race_predicts_to_be_hopeless_is_not_looked_at_again(quiet):
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
-    current = search.evaluated([])
+    current = search.evaluate([])
     power = {i: search.evaluator.cost({i: r}, "fit") for i, r in current.residuals.items()}
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
     r0 = search.evaluator.vector(current.residuals, "fit")
@@ -250,7 +250,7 @@ def test_every_number_of_a_vector_has_its_stretch(quiet):
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     session, evidence = quiet
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
-    well, ill = well_on_fixed_base(search, search.evaluated([]))
+    well, ill = well_on_fixed_base(search, search.evaluate([]))
     assert (well, ill) == (set(session.model.joints), set())
 
 

@@ -1,9 +1,8 @@
-"""Motion capture as it comes over the network: NatNet packets, the recording of a take, and an emulated Motive to record from."""
+"""Motion capture as it comes over the network: NatNet packets, and the recording of a take."""
 
 from workbench.device.capture.finish import Capture, finish
-from workbench.device.capture.link import UdpLink, VirtualLink
+from workbench.device.capture.link import UdpLink
 from workbench.device.capture.recorder import Recorder, RecordOptions
 from workbench.device.capture.take import record_take
-from workbench.device.capture.virtual_motive import Faults, VirtualMotive
 
-__all__ = ["Capture", "Faults", "RecordOptions", "Recorder", "UdpLink", "VirtualLink", "VirtualMotive", "finish", "record_take"]
+__all__ = ["Capture", "RecordOptions", "Recorder", "UdpLink", "finish", "record_take"]

@@ -13,26 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.device.capture.journal import Entry, read_journal
-from workbench.device.capture.ledger import Counts, Ledger
-from workbench.device.capture.packets import (
-    BrokenPacketError,
-    Frame,
-    Message,
-    ServerInfo,
-    kind_of,
-    parse_frame,
-    parse_names,
-    stated_number,
-)
+from workbench.device.capture.journal import read_journal
+from workbench.device.capture.packets import Frame
+from workbench.device.capture.stream import Counts, Echo, Stream
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
 from workbench.types import Array
 
-KEPT = 20
-"""Broken packets whose bytes are kept, for whoever wants to know why."""
 DRIFT_AFTER = 10.0
 """Seconds of echoes from which the clock's drift is estimated: 0.1 ms over them are 10 ppm, less than the difference of two
 crystals."""
@@ -76,75 +65,36 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
     bodies that were not seen, are blank cells. ended: why it ended early. until: host time [s] after which frames are left out.
     InputError where the journal holds no frame."""
     journal, take = Path(journal), Path(take)
-    content = _Content(journal)
-    ledger, frames = content.ledger, content.frames
-    if len(frames) < 2:
+    stream, frames, soonest = Stream(), {}, math.inf  # type: tuple[Stream, dict[int, Frame], float]
+    for arrival, data in read_journal(journal):
+        frame = stream.take(arrival, data)
+        if frame is not None:
+            frames[frame.number] = frame
+            soonest = min(soonest, arrival - frame.time)
+    if len(frames) < 2 or not stream.about:
         raise InputError(journal, f"{len(frames)} whole frames; expected two or more")
-    counts = ledger.counts()
+    counts = stream.counts()
     numbers = np.array(sorted(frames))
     times = np.array([frames[n].time for n in numbers.tolist()])
     rate, worst = _rate(numbers, times)
     first = float(times[0])
-    clock = _clock(content.clocks, first)
-    first_host = clock.host_time(first, first) if math.isfinite(clock.offset) else first + content.soonest
+    clock = _clock(stream.echoes, first)
+    first_host = clock.host_time(first, first) if math.isfinite(clock.offset) else first + soonest
     if until is not None:
         frames = {n: f for n, f in frames.items() if first_host + (f.time - first) <= until}
         if len(frames) < 2:
             raise InputError(journal, "fewer than two frames before the recording's end")
-    bodies = _tracks(frames, content.names, counts.first, max(frames))
+    bodies = _tracks(frames, stream.names, counts.first, max(frames))
     gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
-    problems = _problems(counts, gaps, worst, clock, ended)
-    began = datetime.datetime.fromisoformat(content.head["utc"]) + datetime.timedelta(seconds=first_host - content.head_arrival)
+    note = stream.about
+    began = datetime.datetime.fromisoformat(note["utc"]) + datetime.timedelta(seconds=first_host - note["arrival"])
+    capture = Capture(take, counts, rate, first, first_host, worst, clock, gaps, _problems(counts, gaps, worst, clock, ended))
+    local = began.astimezone()
     write_motive(take, bodies, rate, take_name=take.stem, first_frame=0, metadata={
-        "Capture Start Time": began.astimezone().strftime("%Y-%m-%d %I.%M.%S.%f")[:-3] + began.astimezone().strftime(" %p")})
-    capture = Capture(take, counts, rate, first, first_host, worst, clock, gaps, problems)
+        "Capture Start Time": local.strftime("%Y-%m-%d %I.%M.%S.%f")[:-3] + local.strftime(" %p")})
     write_whole(take.with_suffix(".capture.json"), json.dumps(
-        _report(capture, content, began, motive_recording), indent=1, allow_nan=False) + "\n")
+        _report(capture, stream, began, motive_recording), indent=1, allow_nan=False) + "\n")
     return capture
-
-
-class _Content:
-    """Content of a journal."""
-
-    def __init__(self, path: Path) -> None:
-        self.ledger, self.frames, self.clocks = Ledger(), {}, []  # type: tuple[Ledger, dict[int, Frame], list[dict[str, float]]]
-        self.names: dict[int, str] = {}
-        self.broken: list[bytes] = []
-        self.head: dict[str, Any] = {}
-        self.head_arrival = math.nan
-        self.soonest = math.inf
-        for entry in read_journal(path):
-            if entry.kind == b"H":
-                self._take_head(entry)
-            elif entry.kind == b"C":
-                self.clocks.append(entry.json())
-            elif not self.head:
-                raise InputError(path, "a packet before the head; expected a file that `workbench record` left behind")
-            else:
-                self._take_packet(entry)
-        if not self.head:
-            raise InputError(path, "holds no frame yet")
-
-    def _take_head(self, entry: Entry) -> None:
-        self.head, self.head_arrival = entry.json(), entry.arrival
-        h = self.head
-        self.info = ServerInfo(h["application"], h["application_version"], (h["version"][0], h["version"][1]),
-                               h["clock_frequency"] or math.nan, h["data_port"], h["group"])
-        self.names = {int(k): n for k, n in h["names"].items()}
-
-    def _take_packet(self, entry: Entry) -> None:
-        try:
-            if kind_of(entry.content) == Message.MODELDEF:
-                self.names |= parse_names(entry.content, self.info.version)
-                return
-            frame = parse_frame(entry.content, self.info)
-        except BrokenPacketError:
-            self.ledger.broken(stated_number(entry.content))
-            self.broken.append(entry.content)
-            return
-        if self.ledger.frame(frame.number) in ("new", "late"):
-            self.frames[frame.number] = frame
-            self.soonest = min(self.soonest, entry.arrival - frame.time)
 
 
 def _rate(numbers: NDArray[np.int64], times: Array) -> tuple[float, float]:
@@ -173,13 +123,12 @@ def _tracks(frames: Mapping[int, Frame], names: Mapping[int, str], first: int, l
     return {names.get(number, f"body_{number}"): BodyTrack(p[i], quat[i], error[i]) for number, i in row.items()}
 
 
-def _clock(measured: list[dict[str, float]], first: float) -> ServerClock:
-    """From the echoes: the quarter with the shortest round trips; a drift where they span `DRIFT_AFTER`."""
-    if not measured:
+def _clock(echoes: list[Echo], first: float) -> ServerClock:
+    """From the quarter of the echoes with the shortest round trips; a drift where they span `DRIFT_AFTER`."""
+    if not echoes:
         return ServerClock(math.nan, math.nan, 0.0)
-    trip = np.array([m["received"] - m["sent"] for m in measured])
-    server = np.array([m["server"] for m in measured])
-    offset = server - np.array([(m["received"] + m["sent"]) / 2 for m in measured])
+    sent, received, server = np.array([(e.sent, e.received, e.server) for e in echoes]).T
+    trip, offset = received - sent, server - (received + sent) / 2
     best = trip <= np.quantile(trip, 0.25) + 1e-6
     drift, at = 0.0, float(np.mean(offset[best]))
     if best.sum() > 2 and np.ptp(server[best]) > DRIFT_AFTER:
@@ -187,8 +136,7 @@ def _clock(measured: list[dict[str, float]], first: float) -> ServerClock:
     return ServerClock(at, float(trip[best].min() / 2), drift)
 
 
-def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: ServerClock, ended: str
-              ) -> tuple[str, ...]:
+def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: ServerClock, ended: str) -> tuple[str, ...]:
     out = [ended] if ended else []
     if counts.lost or counts.broken:
         out.append(f"{counts.lost} frames lost on the network and {counts.broken} broken, of {counts.last - counts.first + 1}")
@@ -202,13 +150,15 @@ def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: Se
     return tuple(out)
 
 
-def _report(c: Capture, content: _Content, began: datetime.datetime, motive_recording: str | None) -> dict[str, Any]:
-    known = math.isfinite(c.clock.offset)
+def _report(c: Capture, stream: Stream, began: datetime.datetime, motive_recording: str | None) -> dict[str, Any]:
+    info = stream.info
+    assert info is not None
     return {
         "format": 1, "take": c.take.name,
-        "server": {k: content.head[k] for k in ("application", "application_version", "version", "link")},
+        "server": {"application": info.application, "application_version": info.application_version,
+                   "version": list(info.version), "link": stream.about["link"]},
         "frames": asdict(c.counts), "rate": c.rate, "worst_time": c.worst_time, "gaps": dict(c.gaps),
         "first_frame": {"server_time": c.first_time, "host_monotonic": c.first_host, "utc": began.isoformat()},
-        "clock": asdict(c.clock) if known else None, "motive_recording": motive_recording, "problems": list(c.problems),
-        "broken_packets": [data.hex() for data in content.broken[:KEPT]],
+        "clock": asdict(c.clock) if math.isfinite(c.clock.offset) else None, "motive_recording": motive_recording,
+        "problems": list(c.problems), "broken_packets": [data.hex() for data in stream.broken],
     }

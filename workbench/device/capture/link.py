@@ -1,4 +1,4 @@
-"""Ways to a Motive server: UDP sockets in real time, or an emulated server in the same process and in virtual time."""
+"""The way to a Motive server: UDP sockets, in real time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from contextlib import suppress
 from typing import Protocol
 
 from workbench.device.capture.packets import ServerInfo
-from workbench.device.capture.virtual_motive import VirtualMotive
 from workbench.files import InputError
 
 BUFFER = 4 << 20
@@ -118,49 +117,6 @@ class UdpLink:
         for s in (self._command, self._data):
             if s is not None:
                 s.close()
-
-
-class VirtualLink:
-    """An emulated server in this process; waiting costs virtual time only."""
-
-    _delay = 0.2e-3  # [s] of each packet, either way
-
-    def __init__(self, server: VirtualMotive) -> None:
-        self._server, self._now = server, server.started
-        self._waiting: list[tuple[float, bytes]] = []
-
-    @property
-    def description(self) -> str:
-        """Whom this link speaks to, and through what."""
-        return "emulated server"
-
-    def now(self) -> float:
-        """Time of this link's clock [s]."""
-        return self._now
-
-    def send(self, data: bytes) -> None:
-        """Sends a packet to the server; InputError where it cannot be reached."""
-        self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
-
-    def subscribe(self, info: ServerInfo) -> None:
-        """Nothing to join: the emulated server sends to this link."""
-        pass
-
-    def receive(self, timeout: float) -> tuple[float, bytes] | None:
-        """The next packet and when it came [s], None where none comes within `timeout` [s]."""
-        end = self._now + timeout
-        self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
-        self._waiting.sort(key=lambda item: item[0])
-        if not self._waiting or self._waiting[0][0] > end:
-            self._now = end
-            return None
-        arrival, data = self._waiting.pop(0)
-        self._now = max(self._now, arrival)
-        return self._now, data
-
-    def close(self) -> None:
-        """Closes both sockets."""
-        pass
 
 
 def addresses() -> list[str]:

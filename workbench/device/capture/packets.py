@@ -41,6 +41,8 @@ class Message(IntEnum):
     ECHO_REQUEST = 12
     ECHO_RESPONSE = 13
     UNRECOGNIZED_REQUEST = 100
+    NOTE = 0xFFFF
+    """No message of NatNet: this program's own entry in its journal, JSON."""
 
 
 class BrokenPacketError(ValueError):

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import datetime
+import json
 import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from workbench.device.capture.journal import Journal
-from workbench.device.capture.ledger import Counts, Ledger
 from workbench.device.capture.link import Link
-from workbench.device.capture.packets import (
-    HIRES,
-    OLDEST,
-    BodyPose,
-    BrokenPacketError,
-    Message,
-    ServerInfo,
-    kind_of,
-    packet,
-    parse_frame,
-    parse_names,
-    parse_server_info,
-    stated_number,
-)
+from workbench.device.capture.packets import HIRES, OLDEST, BodyPose, BrokenPacketError, Message, ServerInfo, kind_of, packet
+from workbench.device.capture.stream import Counts, Stream
 from workbench.files import InputError
+
+RESTARTED = 10
+"""Frames in a row that are of another stream: then Motive was restarted or plays back."""
 
 
 @dataclass(frozen=True)
@@ -50,44 +41,64 @@ class RecordOptions:
 
 class Recorder:
     """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come. latest: of each
-    rigid body the last pose, and when it arrived [s]."""
+    rigid body the last pose, and when it arrived [s]. problem: why the recording ended early."""
 
     def __init__(self, link: Link, options: RecordOptions | None = None) -> None:
         self.link, self.options = link, options or RecordOptions()
-        self.info: ServerInfo | None = None
-        self.names: dict[int, str] = {}
         self.latest: dict[str, tuple[float, BodyPose]] = {}
-        self.tracked = 0
         self.problem = ""
-        self._ledger = Ledger()
-        self._last_frame = -math.inf
-        self._echoed = self._alive = -math.inf
-        self._restarts = 0
-        self._asked: float | None = None
+        self._stream = Stream()
+        self._descriptions: list[bytes] = []
+        self._tracked = 0
+        self._last_frame = self._echoed = self._alive = self._asked = -math.inf
+
+    @property
+    def info(self) -> ServerInfo:
+        """Description of the server."""
+        assert self._stream.info is not None, "connect first"
+        return self._stream.info
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Names of the rigid bodies by their numbers."""
+        return self._stream.names
 
     @property
     def counts(self) -> Counts:
         """Counts of the frames so far."""
-        return self._ledger.counts()
+        return self._stream.counts()
+
+    @property
+    def counts_received(self) -> bool:
+        """Whether any frame has come."""
+        return self._stream.last >= 0
 
     def connect(self) -> ServerInfo:
         """Finds the server and the names of its assets; InputError in one line where it does not answer, or is too old."""
-        data = self._ask(Message.CONNECT, b"Ping\0", Message.SERVER_INFO)
-        if data is None:
-            raise self._error(f"no answer from Motive in {self._patience:g} s; is streaming on in Motive (Settings, Streaming), "
-                              "on that interface, and does a firewall let UDP 1510 and 1511 pass?")
-        try:
-            self.info = info = parse_server_info(data)
-        except BrokenPacketError as e:
-            raise self._error(f"answers, but not as a NatNet server ({e})") from None
+        patience = self.options.answer * self.options.questions
+        self._learn(Message.CONNECT, b"Ping\0", Message.SERVER_INFO,
+                    f"no answer from Motive in {patience:g} s; is streaming on in Motive (Settings, Streaming), on that "
+                    "interface, and does a firewall let UDP 1510 and 1511 pass?")
+        info = self.info
         if not (OLDEST <= info.version < (5, 0)):
             version = "{}.{}".format(*info.version)
             raise self._error(f"{info.application} {info.application_version} streams NatNet {version}; expected 2.7 to 4.x")
         if info.version >= HIRES and not info.clock_frequency > 0:
             raise self._error(f"{info.application} does not say how fast its clock ticks")
         self.link.subscribe(info)
-        self._describe()
+        self._learn(Message.REQUEST_MODELDEF, b"", Message.MODELDEF,
+                    "Motive answers, but does not describe its assets; is 'Rigid Bodies' on in its streaming settings?")
         return info
+
+    def _learn(self, question: Message, payload: bytes, answer: Message, silence: str) -> None:
+        """Asks for a description; it belongs to the recording as well."""
+        data = self._ask(question, payload, answer)
+        if data is None:
+            raise self._error(silence)
+        self._stream.take(self.link.now(), data)
+        if self._stream.broken:
+            raise self._error(f"answers, but not as a NatNet server ({self._stream.problem})")
+        self._descriptions.append(data)
 
     def request_recording(self, name: str) -> str:
         """Asks Motive to record the take itself, under this name; "" where it does, else its answer."""
@@ -107,8 +118,7 @@ class Recorder:
 
         A stream that stops, or restarts with other numbers, ends it; `problem` then states the reason.
         """
-        assert self.info is not None, "connect first"
-        self._head(journal)
+        self._begin(journal)
         began, first = self.link.now(), math.inf
         while not until() and not self.problem:
             received = self.link.receive(0.05)
@@ -128,71 +138,40 @@ class Recorder:
             self.problem = f"no frame came in the last {quiet:.1f} s of the recording"
         return self.counts
 
-    @property
-    def counts_received(self) -> bool:
-        """Whether any frame has come."""
-        return self._ledger.last >= 0
-
-    @property
-    def _patience(self) -> float:
-        return self.options.answer * self.options.questions
-
-    def _head(self, journal: Journal) -> None:
-        assert self.info is not None
-        i = self.info
-        journal.note(b"H", self.link.now(), {
-            "application": i.application, "application_version": i.application_version, "version": list(i.version),
-            "clock_frequency": i.clock_frequency if i.version >= HIRES else None, "data_port": i.data_port, "group": i.group,
-            "link": self.link.description, "names": {str(k): n for k, n in self.names.items()},
-            "utc": datetime.datetime.now(datetime.UTC).isoformat()})
+    def _begin(self, journal: Journal) -> None:
+        """The note and the descriptions, without which frames cannot be read."""
+        now = self.link.now()
+        note = {"link": self.link.description, "arrival": now, "utc": datetime.datetime.now(datetime.UTC).isoformat()}
+        for data in (packet(Message.NOTE, json.dumps(note).encode()), *self._descriptions):
+            journal.packet(now, data)
 
     def _said(self) -> str:
         c = self.counts
-        bodies = f"{self.tracked} of {len(self.names)} bodies"
+        bodies = f"{self._tracked} of {len(self.names)} bodies"
         return f"recording, {c.received} frames, {c.lost} lost, {c.broken} broken, {bodies}"
 
     def _take(self, journal: Journal, arrival: float, data: bytes) -> None:
-        """One packet, whatever it holds: nothing that comes over the network may end the recording."""
-        assert self.info is not None
-        try:
-            kind = kind_of(data)
-            if kind == Message.FRAME:
-                self._frame(journal, arrival, data)
-            elif kind == Message.MODELDEF:
-                self.names |= parse_names(data, self.info.version)
-                self._asked = None
-                journal.packet(arrival, data)
-            elif kind == Message.ECHO_RESPONSE and len(data) >= 20:
-                sent, ticks = struct.unpack_from("<QQ", data, 4)
-                journal.note(b"C", arrival, {"sent": sent / 1e9, "received": arrival,
-                                             "server": ticks / self.info.clock_frequency})
-        except BrokenPacketError:
-            self._ledger.broken(stated_number(data))
-            self._last_frame = arrival
-            journal.packet(arrival, data)
-
-    def _frame(self, journal: Journal, arrival: float, data: bytes) -> None:
-        assert self.info is not None
-        frame = parse_frame(data, self.info)
-        how = self._ledger.frame(frame.number)
-        if how == "far":
-            self._restarts += 1
-            if self._restarts > 10:
-                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was restarted or "
-                                "plays back; the frames before are kept")
-            return
-        self._restarts = 0
-        self._last_frame = arrival
-        self.latest |= {self.names[b.id]: (arrival, b) for b in frame.bodies if b.id in self.names}
-        self.tracked = sum(body.tracked for body in frame.bodies)
+        """One packet, whatever it holds."""
         journal.packet(arrival, data)
+        known, broken = len(self.names), self.counts.broken
+        frame = self._stream.take(arrival, data)
+        if frame is not None or self.counts.broken > broken:
+            self._last_frame = arrival
+        if len(self.names) > known:
+            self._asked = -math.inf
+        if self._stream.jumps > RESTARTED:
+            self.problem = (f"the stream jumped from frame {self._stream.last} to {self._stream.jumped_to}: Motive was restarted "
+                            "or plays back; the frames before are kept")
+        if frame is None:
+            return
+        self.latest |= {self.names[b.id]: (arrival, b) for b in frame.bodies if b.id in self.names}
+        self._tracked = sum(body.tracked for body in frame.bodies)
         unknown = any(body.id not in self.names for body in frame.bodies)
-        if (frame.models_changed or unknown) and (self._asked is None or arrival - self._asked > self.options.answer):
+        if (frame.models_changed or unknown) and arrival - self._asked > self.options.answer:
             self._asked = arrival
             self.link.send(packet(Message.REQUEST_MODELDEF))
 
     def _stay_in_touch(self, now: float) -> None:
-        assert self.info is not None
         if self.info.version >= HIRES and now - self._echoed >= self.options.echo_every:
             self._echoed = now
             self.link.send(packet(Message.ECHO_REQUEST, struct.pack("<Q", round(now * 1e9))))
@@ -204,23 +183,12 @@ class Recorder:
     def _check_silence(self, since_begin: float, since_frame: float) -> None:
         if not self.counts_received and since_begin > self.options.first_frame:
             broken = self.counts.broken
-            assert self.info is not None
             way = f"multicast group {self.info.group}" if self.info.group else "unicast"
             what = f"{broken} packets came and none could be read" if broken else "no frame came"
             raise self._error(f"{what} in {since_begin:.1f} s by {way}; is Motive live, and streaming on that interface? Choose "
                               "another with --interface")
         if self.counts_received and since_frame > self.options.silence:
             self.problem = f"the stream stopped: no frame for {since_frame:.1f} s"
-
-    def _describe(self) -> None:
-        data = self._ask(Message.REQUEST_MODELDEF, b"", Message.MODELDEF)
-        if data is None:
-            raise self._error("Motive answers, but does not describe its assets; is 'Rigid Bodies' on in its streaming settings?")
-        assert self.info is not None
-        try:
-            self.names = parse_names(data, self.info.version)
-        except BrokenPacketError as e:
-            raise self._error(str(e)) from None
 
     def _error(self, problem: str) -> InputError:
         return InputError(None, f"{self.link.description}: {problem}")

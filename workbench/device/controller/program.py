@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import subprocess
 from dataclasses import dataclass
@@ -26,6 +27,11 @@ class Program:
     image: bytes
     table: TableFile
     violations: tuple[Violation, ...]
+
+    @property
+    def sha256(self) -> str:
+        """Of the image: equal programs built by the same compiler have the same."""
+        return hashlib.sha256(self.image).hexdigest()
 
 
 CYCLES = 10

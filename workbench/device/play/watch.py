@@ -32,10 +32,10 @@ class WatchOptions:
     """When a reading counts.
 
     confirm: how many readings, or unanswered questions, in a row of one servo. silent: how long it may go unheard [s], whether
-    it was asked or not. failures, share: this many unanswered questions within that time, and this share of all, end a motion
-    even if the servo answered in between, as one with a duplicate ID does. cooler: how far below the limit at which it shuts
-    itself down it has to stay [deg C], so that there is torque left for the way to neutral. dead: share of the lowest voltage
-    below which a ramp would only brown out again.
+    it was asked or not. failures, share: with at least so many unanswered questions within that time, and at least such a share
+    of them, a motion ends even if the servo answered in between, which happens where two have its ID. cooler: how far below the
+    limit at which it shuts itself down it has to stay [deg C], so that there is torque for the way to neutral. dead: share of
+    the lowest voltage below which a ramp would only brown out again.
     """
 
     confirm: int = 2
@@ -56,7 +56,7 @@ SUDDEN = ("electrical shock", "current")
 
 class Watch:
     """Judges readings as they come; the first that is confirmed is the reaction, and stays. doubted: a servo that ended the
-    motion because it did not answer as one servo does; what was read under its ID for `silent` before may be another's."""
+    motion by its silence; two may have its ID, and readings of the time before may be the other's."""
 
     def __init__(self, profile: ServoProfile, joints: Mapping[int, str], limits: Mapping[int, int],
                  options: WatchOptions | None = None) -> None:

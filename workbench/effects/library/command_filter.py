@@ -21,7 +21,8 @@ class CommandFilter(ServoConstant):
     parameters = (Parameter("time", "s", 0.0, 1.0, 0.01, seldom_beyond=0.06),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} smooths its goals with a time constant {1000 * scalar(spec, 'time'):.1f} ms longer."
+        where = ", ".join(spec.where)
+        return f"{where} filters its goals with a time constant {1000 * scalar(spec, 'time'):.1f} ms above nominal."
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
         return any_proportional(model)

@@ -16,7 +16,7 @@ class DeadBand(ServoConstant):
     parameters = (Parameter("margin", "deg", 0.0, 15.0, 0.5, si=DEGREE, seldom_beyond=2.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} gives no torque within {spec.parameters['margin']:.1f} deg more of its goal, each side."
+        return f"The dead band of {', '.join(spec.where)} is {spec.parameters['margin']:.1f} deg wider on each side of its goal."
 
 
 EFFECT = DeadBand()

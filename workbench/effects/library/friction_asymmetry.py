@@ -44,7 +44,7 @@ class FrictionAsymmetry(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         ratio = scalar(spec, "ratio")
         way, more = ("positive", ratio) if ratio >= 1 else ("negative", 1 / ratio)
-        return f"{', '.join(spec.where)} turns harder to {way} angles: {more:.2f} times the dry friction of the other way."
+        return f"{', '.join(spec.where)} has {more:.2f} times as much dry friction towards {way} angles as the other way."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)

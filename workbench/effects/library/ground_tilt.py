@@ -28,7 +28,7 @@ class GroundTilt(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         forward, left = spec.parameters["forward"], spec.parameters["left"]
-        return f"Gravity leans {forward:.1f} deg forward and {left:.1f} deg to the left of the floor's normal."
+        return f"Gravity is tilted by {forward:.1f} deg forward and {left:.1f} deg to the left against the floor's normal."
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         if name not in self.equivalent_to:

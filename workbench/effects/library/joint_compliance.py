@@ -24,7 +24,7 @@ class JointCompliance(Effect):
     parameters = (Parameter("stiffness", "N m/rad", 0.2, 1e4, 10.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} twists against its servo with {scalar(spec, 'stiffness'):.1f} N m/rad."
+        return f"{', '.join(spec.where)} is coupled to its servo with a stiffness of {scalar(spec, 'stiffness'):.1f} N m/rad."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)

@@ -38,8 +38,9 @@ class LoadFriction(Effect):
         static, backdrive = (float(spec.parameters.get(name, 0.0)) for name in ("static", "backdrive"))  # type: ignore[arg-type]
         more = [f"{100 * static:.0f} % more at rest"] if static else []
         more += [f"{100 * backdrive:.0f} % more where the load drives the motor"] if backdrive else []
-        said = f", and by {' and by '.join(more)}" if more else ""
-        return f"{', '.join(spec.where)} rubs by {100 * scalar(spec, 'coefficient'):.0f} % of the torque that it transmits{said}."
+        said = f", {' and '.join(more)}" if more else ""
+        share = 100 * scalar(spec, "coefficient")
+        return f"{', '.join(spec.where)} loses {share:.0f} % of the torque that it transmits to friction{said}."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, 0.0, self.parameters[2].typical, 0.0

@@ -20,7 +20,7 @@ class MinimumDuty(ServoConstant):
     parameters = (Parameter("duty", "1", 0.0, 0.5, 0.02, seldom_beyond=0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} gives {100 * scalar(spec, 'duty'):.1f} % more duty than nominal as soon as it gives any."
+        return f"The smallest duty of {', '.join(spec.where)} is {100 * scalar(spec, 'duty'):.1f} % of full duty above nominal."
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
         return any_proportional(model)

@@ -27,7 +27,7 @@ class ServoGain(ServoConstant):
     parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8, seldom_beyond=2.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The position law of {', '.join(spec.where)} is {spec.parameters['ratio']:.2f} times as steep as nominal."
+        return f"The position gain of {', '.join(spec.where)} is {spec.parameters['ratio']:.2f} times nominal."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)

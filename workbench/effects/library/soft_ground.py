@@ -19,7 +19,7 @@ class SoftGround(Effect):
     parameters = (Parameter("stiffness", "N/m", 200.0, 1e7, 5e3),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"Each contact point of a foot is as soft as {spec.parameters['stiffness']:.0f} N/m."
+        return f"Each contact point of a foot has a stiffness of {spec.parameters['stiffness']:.0f} N/m."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)

@@ -45,7 +45,7 @@ class StribeckFriction(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return (f"{', '.join(spec.where)} sticks: {scalar(spec, 'torque'):.3f} N m more dry friction at rest, "
-                f"gone above some {2 * scalar(spec, 'speed'):.0f} deg/s.")
+                f"which vanishes above about {2 * scalar(spec, 'speed'):.0f} deg/s.")
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, self.parameters[1].typical

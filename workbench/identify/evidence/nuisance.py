@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -67,7 +68,7 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
             zeros += [turned_horn(joint, by)] if by else []
         elif by:
             scales.setdefault(joint, {})[name] = math.exp(by)
-    servos |= {joint: _scaled(servos[joint], by) for joint, by in scales.items()}
+    servos |= {joint: _scaled(servos[joint], tuple(by.items())) for joint, by in scales.items()}
     return model.with_physics(servos, (*model.effects, *zeros))
 
 
@@ -102,9 +103,10 @@ def nominal_value(servo: ServoConstants, name: str) -> float:
     return float(getattr(servo, name))
 
 
-def _scaled(servo: ServoConstants, scales: Mapping[str, float]) -> ServoConstants:
+@lru_cache(maxsize=256)  # most models that are compared differ in one number of one servo
+def _scaled(servo: ServoConstants, scales: tuple[tuple[str, float], ...]) -> ServoConstants:
     out = {"stall_torque": servo.stall_torque, "no_load_speed": servo.no_load_speed}
-    for name, by in scales.items():
+    for name, by in scales:
         if name == "torque_at_full_duty":  # the back-EMF stays
             out = {**out, "stall_torque": out["stall_torque"] * by, "no_load_speed": out["no_load_speed"] * by}
         elif name == "back_emf":

@@ -67,23 +67,23 @@ class Search:
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
         return floating_base if floating_base and alone else takes
 
-    def resettled(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
+    def resettle(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
         """`current` with the settled effects, and `more`, fitted again on fixed-base takes, and the search in which these are
         settled: for when an effect was dropped or added."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         free = self.with_settled(None)
-        fitted = free.refitted(free.evaluated(there), self.fixed_base, FIT.refit_steps, range(len(there)))
-        settled = free.with_timing_refitted(fitted)
+        fitted = free.refit(free.evaluate(there), self.fixed_base, FIT.refit_steps, range(len(there)))
+        settled = free.refit_timing(fitted)
         known = settled.sizes_by_key()
-        return self.with_settled(settled), self.evaluated([(c, known.get(c.key, x)) for c, x in current.sizes()])
+        return self.with_settled(settled), self.evaluate([(c, known.get(c.key, x)) for c, x in current.sizes()])
 
-    def with_timing_refitted(self, current: Fit) -> Fit:
+    def refit_timing(self, current: Fit) -> Fit:
         """A fit on fixed-base takes with its timing parameters identified from all takes: contact changes much, but not the times
         of commands. Unchanged if fixed-base takes contradict that: then something else is missing on floating-base takes."""
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
         if not timing or not self.floating_base(self.fitted):
             return current
-        fit = self.refitted(current, self.fitted, FIT.refit_steps, timing)
+        fit = self.refit(current, self.fitted, FIT.refit_steps, timing)
         if contradicted_by_fixed_base(self, fit, current):
             return current
         numbers = fit.numbers(timing)
@@ -92,7 +92,7 @@ class Search:
         kept = [replace(s, numbers=s.numbers[other], J=s.J[:, other]) for s, other in others if other.any()]
         return replace(fit, covariance=covariance, slopes=(*kept, *fit.slopes))
 
-    def evaluated(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
+    def evaluate(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
         """Effects as they are, on all takes."""
         return self.side_by_side([self.evaluating(effects)])[0][0]
 
@@ -110,7 +110,7 @@ class Search:
         done = together(dict(enumerate(parts)), lambda wanted: self.evaluator.residuals([q for _, q in wanted]), report)
         return [done[n] for n in range(len(parts))]
 
-    def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
+    def refit(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
         """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
         return self.side_by_side([self.refitting(current, takes, iterations, free)])[0]
 

@@ -18,7 +18,7 @@ def without_part_answers(search: Search, current: Fit, rounds: Sequence[Selectio
     for r in reversed(rounds):
         for t in r.accepted:
             if explained_at_the_end(search, r, t, current) < ACCEPTANCE.last_closed:
-                current = search.evaluated(current.sizes_without(t.candidate.key))
+                current = search.evaluate(current.sizes_without(t.candidate.key))
     return current
 
 
@@ -30,12 +30,12 @@ def without_idle(search: Search, current: Fit) -> Fit:
             break
         c, settled = current.effects[i], search.is_settled(current.effects[i])
         least = FIT.least_gain * max(1, c.size) * (ACCEPTANCE.all_closed if settled else 1.0)
-        rest = search.evaluated(current.sizes_without(c.key))
+        rest = search.evaluate(current.sizes_without(c.key))
         before = rest.cost["choose"]
         if before - current.cost["choose"] < BACKWARD.clearly * least:
-            rest = search.refitted(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
+            rest = search.refit(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
         if not settled and contradicted_by_fixed_base(search, current, rest):
-            rest = search.refitted(rest, search.fitted, SUBSETS.together_steps)
+            rest = search.refit(rest, search.fitted, SUBSETS.together_steps)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
     return current

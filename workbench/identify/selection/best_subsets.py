@@ -188,7 +188,7 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
         return fit
     fits = search.side_by_side([_fitted_from(search, sizes, takes, SUBSETS.most_steps) for sizes in starts])
     best = min(fits, key=penalised_cost)
-    return search.refitted(best, takes, steps) if penalised_cost(best) < SUBSETS.half * penalised_cost(fit) else fit
+    return search.refit(best, takes, steps) if penalised_cost(best) < SUBSETS.half * penalised_cost(fit) else fit
 
 
 def penalised_cost(fit: Fit) -> float:
@@ -204,7 +204,7 @@ def selection_steps(search: Search, current: Fit, sets: Sequence[tuple[Fit, list
     sizes = best.sizes_by_key()
     out = []
     for t in chosen:
-        rest = search.evaluated(best.sizes_without(t.candidate.key))
+        rest = search.evaluate(best.sizes_without(t.candidate.key))
         gain = {use: rest.cost[use] - best.cost[use] for use in ("fit", "choose")}
         trials = [replace(t, x=sizes[t.candidate.key], gain=gain)]
         for fit, others in sets[1:]:

@@ -25,10 +25,10 @@ def checked_on_fixed_base(search: Search, current: Fit, identified: Sequence[Can
 
 def _check(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
     fixed, floating = search.fixed_base, search.floating_base(search.fitted)
-    without = search.evaluated(current.sizes_without(c.key))
+    without = search.evaluate(current.sizes_without(c.key))
     if not contradicted_by_fixed_base(search, current, without):
         return search, current
-    settled, fit = search.resettled(current, c)
+    settled, fit = search.resettle(current, c)
     walking = [gain_between(search.evaluator, without, there, floating, "fit") for there in (fit, current)]
     if gain_between(search.evaluator, without, fit, fixed, "fit") > 0 and walking[0] > SUBSETS.nearly_all * walking[1]:
         return settled, fit

@@ -39,7 +39,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
            played: TakesAsPlayed | None = None) -> SelectionResult:
     """The accepted effects. thorough: without a limit of work; else, once it is reached, the trials so far decide. played: the
     takes without commands that never arrived, read again with the effects identified on fixed-base takes."""
-    current = nominal = search.evaluated([])
+    current = nominal = search.evaluate([])
     rounds: list[SelectionStep] = []
     most = np.inf if thorough else max(FORWARD.most_work, FORWARD.most_rollouts * search.evaluator.seconds)
     if search.fixed_base:
@@ -49,12 +49,12 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
         begun = search
         search, played = reestimate(search, current, played)
         if search is not begun:
-            rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
-            there = search.evaluated(current.sizes())
-            current = search.refitted(there, search.fixed_base or search.fitted, FORWARD.replayed_steps)
-        nominal = search.evaluated([])
+            rounds = [replace(r, before=search.evaluate(r.before.sizes())) for r in rounds]
+            there = search.evaluate(current.sizes())
+            current = search.refit(there, search.fixed_base or search.fitted, FORWARD.replayed_steps)
+        nominal = search.evaluate([])
     if search.fixed_base != search.fitted:
-        current = search.with_timing_refitted(current)
+        current = search.refit_timing(current)
         search = search.with_settled(current)
         closed = least_closed(search, nominal, current)
         search, current, rounds = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
@@ -64,9 +64,9 @@ def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough
         report("fitting together", None)
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
-            search, kept = search.resettled(kept)
+            search, kept = search.resettle(kept)
         if kept is not current or _may_go_on(search, kept):
-            kept = search.refitted(kept, search.fitted, FORWARD.last_steps)
+            kept = search.refit(kept, search.fitted, FORWARD.last_steps)
     return SelectionResult(search, kept, tuple(rounds), played.missed if played else ())
 
 

@@ -28,7 +28,7 @@ def left_to_chance(search: Search, current: Fit, known: Collection[Key]) -> tupl
         return search, current
     evaluator = search.evaluator.on([_wider(e, loose) for e in search.evaluator.evidence])
     search = Search(evaluator, search.nominal, search.settled)  # responses were looked at in other units
-    there = search.evaluated(current.sizes())
+    there = search.evaluate(current.sizes())
     return search, replace(current, cost=there.cost, residuals=there.residuals)
 
 

@@ -59,8 +59,8 @@ def compare_models(search: Search, chosen: SelectionResult, report: Progress) ->
         r, _ = taken_in[replaced.key]
         taken_in[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
         if search.is_settled(replaced):
-            search, best = search.resettled(best, best.effects[-1])
-        fit = search.refitted(best, search.fitted, RIVAL.steps)
+            search, best = search.resettle(best, best.effects[-1])
+        fit = search.refit(best, search.fitted, RIVAL.steps)
     return search, fit, [_posterior(search, fit, i, there, taken_in) for i, there in enumerate(rivals)]
 
 

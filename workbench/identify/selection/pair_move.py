@@ -39,7 +39,7 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
         return current, list(rounds)
     first, found = by_all[-1]
     report(f"trying two causes for {found.candidate}", None)
-    rest = search.evaluated(current.sizes_without(found.candidate.key))
+    rest = search.evaluate(current.sizes_without(found.candidate.key))
     free = [c for c in pool if _may_pair(c) and c.key not in {e.key for e in rest.effects}]
     known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
     known |= {t.candidate.key: t for t in first.trials if t.candidate in free and judged_by_all(search, t)
@@ -110,7 +110,7 @@ def _predict_pairs(search: Search, rest: Fit, ones: Sequence[CandidateFit], othe
                    ) -> list[list[CandidateFit]]:
     """The pairs with the smallest residuals according to lines around each one's fit, with sizes to begin from."""
     takes = search.telling([t.candidate for t in ones], search.fitted)
-    around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
+    around = [_Around.of(t, search.evaluate([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
     questions = [
         RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.asked()
     ]

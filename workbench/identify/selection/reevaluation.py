@@ -38,7 +38,7 @@ def _reevaluate(
               and o.gain["choose"] > REEVALUATION.near * t.gain["choose"]][:REEVALUATION.most]
     if not rivals:
         return current, r
-    rest = search.evaluated(current.sizes_without(t.candidate.key))
+    rest = search.evaluate(current.sizes_without(t.candidate.key))
     fits = search.side_by_side([fitted_beside(search, rest, [o], takes, SUBSETS.most_steps) for o in rivals])
 
     def left(fit: Fit) -> dict[str, float]:

@@ -75,12 +75,13 @@ def _why_out_of_order(time: Array) -> str:
     return "expected increasing times"
 
 
-def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_],
+def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_] | None = None,
                      initial: Array | None = None, speeds: Array | None = None) -> Commands:
     """Rows of goals (N, n) [rad] at times (N,) [s] as commands, zero at the first row, only where something changes.
 
-    speeds (N, n) [rad/s]: moving speeds; left out, or 0: at once. A blank goal repeats the last one, or before the first is
-    `initial` (n,) [rad], neutral where that is unknown."""
+    enabled (N, n): torque, on if left out. speeds (N, n) [rad/s]: moving speeds; left out, or 0: at once. A blank goal repeats
+    the last one, or before the first is `initial` (n,) [rad], neutral where that is unknown."""
+    enabled = np.ones(goals.shape, dtype=bool) if enabled is None else enabled
     at = np.where(np.isfinite(goals), np.arange(len(goals))[:, None], -1)
     at = np.maximum.accumulate(at, axis=0)
     first = np.zeros(len(joints)) if initial is None else np.nan_to_num(initial)

@@ -18,14 +18,15 @@ FRAME = "mocap"
 
 
 def write_rosbag(recording: Recording, folder: str | Path, began: float) -> Path:
-    """Writes a folder that `ros2 bag play` plays; a bag of that name is replaced. Angles are in rad, places in m with z up.
+    """Writes a folder that `ros2 bag play` plays; a bag of that name is replaced, and nothing else. Angles are in rad, places in
+    m with z up.
 
     began: time zero of the recording, in seconds since 1970 (UTC). A joint state holds the joints that were read then; a goal is
     a point of the trajectory, stamped with its start. InputError where the folder cannot be written, or is something else.
     """
     folder = Path(folder)
-    if folder.exists() and not (folder / "metadata.yaml").is_file():
-        raise InputError(folder, "already exists and is not a bag")
+    if folder.exists() and not _is_bag_alone(folder):
+        raise InputError(folder, "already exists and is not a bag, or holds more than one; name another folder")
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:
@@ -39,6 +40,14 @@ def write_rosbag(recording: Recording, folder: str | Path, began: float) -> Path
         shutil.rmtree(part, ignore_errors=True)
         raise InputError(folder, f"cannot be written ({e.strerror})") from None
     return folder
+
+
+def _is_bag_alone(folder: Path) -> bool:
+    """Whether a folder holds a bag's metadata and its files, and nothing else that replacing it would delete."""
+    metadata = folder / "metadata.yaml"
+    if not metadata.is_file() or not metadata.read_bytes()[:200].lstrip().startswith(b"rosbag2_bagfile_information"):
+        return False
+    return all(f == metadata or (f.is_file() and f.suffix in _BAG_FILES) for f in folder.iterdir())
 
 
 def _name_after(part: Path, name: str) -> None:
@@ -64,6 +73,7 @@ def _write(recording: Recording, folder: Path, began: float) -> None:
                 writer.write(connection, time, store.serialize_cdr(message, kind))
 
 
+_BAG_FILES = (".mcap", ".db3")
 Messages = list[tuple[int, Any]]
 """Each with its time [ns since 1970]."""
 

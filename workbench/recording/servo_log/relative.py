@@ -15,16 +15,18 @@ from workbench.types import Array
 class RelativeChecks:
     """spans: rows over which a joint's travel is compared with the sum of its goals, and from its position with the goal (which
     then explains `from_place` of its variance). later: rows by which it may come later. explained: share of the travel's variance
-    that the goals explain. alike: tolerance of the ratio of the two around 1, for steps from row to row; from the joint's
-    position, a servo makes `least` to `largest` of it. absolute: share of the position's variance that the goals explain as
-    angles, above which they are angles, if the joint does not move `beyond` times as far; of a swing, its own slope explains as
-    much a quarter of a period later. smaller: the goals' range is at most so much of the position's. fewest: least number of
-    rows. added: share of the position's variance that summed goals explain for a servo that follows late and smoothed."""
+    that the goals explain. tolerance: of the ratio of the two around 1, for steps from row to row; from the joint's position, a
+    servo makes `least` to `largest` of it. absolute: share of the position's variance that the goals explain as angles, above
+    which they are angles, if the joint does not move `beyond` times as far; of a swing, its own slope explains as much a quarter
+    of a period later. smaller: the goals' range is at most so much of the position's, unless they are 0 in more than the share
+    `rests` of the rows. fewest: least number of rows. added: share of the position's variance that summed goals explain for a
+    servo that follows late and smoothed. moved, rounding: a position moves by more from row to row [deg], and a set point that
+    stands by less [deg]; still: share of the moving rows in which it stands."""
 
     spans: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
     later: int = 6
     explained: float = 0.85
-    alike: float = 0.4
+    tolerance: float = 0.4
     from_place: float = 0.7
     least: float = 0.25
     largest: float = 4.0
@@ -33,30 +35,52 @@ class RelativeChecks:
     smaller: float = 0.6
     fewest: int = 30
     added: float = 0.9
+    rests: float = 0.8
+    moved: float = 0.05
+    rounding: float = 0.002
+    still: float = 0.7
 
 
 RELATIVE = RelativeChecks()
+_FROM_PLACE = ("looks like the way from the position to the goal: relative actions; add each row's position to get angles before "
+               "use")
 
 
 def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
     """A line where goals are steps and not angles; None where they are angles, or nothing tells."""
     goal, position = log.goal, log.position
-    if len(goal) < c.fewest + max(c.spans) + c.later or np.ptp(goal) > c.smaller * np.ptp(position) or np.ptp(goal) == 0:
+    if len(goal) < c.fewest + max(c.spans) + c.later or np.ptp(goal) == 0 or np.ptp(position) == 0:
+        return None
+    if _makes_set_points(goal, position, c):
+        return _FROM_PLACE
+    impulses = np.mean(goal == 0) > c.rests  # steps of set points, as large as the way itself
+    if not impulses and np.ptp(goal) > c.smaller * np.ptp(position):
         return None
     fit = followed(log.time, goal, position)
     if fit.explained > c.absolute and fit.gain < c.beyond:
         return None
     added = fit_response(shapes(log.time, np.cumsum(goal)), position)
-    steps = added.explained > c.added and abs(added.gain - 1) < c.alike and \
+    steps = added.explained > c.added and abs(added.gain - 1) < c.tolerance and \
         np.mean((position - added.predicted) ** 2) < (1 - c.added) * np.var(position)
     if steps or _best(goal, position, c, summed=True):
         return ("looks like the change of the position from row to row: relative actions (deltas); add them up to angles before "
                 "use")
     if _best(goal, position, c, summed=False):
-        return ("looks like the way from the position to the goal: relative actions; add each row's position to get angles "
-                "before "
-                "use")
+        return _FROM_PLACE
     return None
+
+
+def _makes_set_points(goal: Array, position: Array, c: RelativeChecks) -> bool:
+    """Whether goals added to positions stand still, to the rounding of both, in rows in which the position moves: the distances
+    to set points that step."""
+    for later in (0, 1):
+        places = position[:len(position) - later]
+        moved = np.flatnonzero(np.abs(np.diff(places)) > np.deg2rad(c.moved))
+        points = goal[later:] + places
+        still = np.abs(np.diff(points))[moved] < np.deg2rad(c.rounding)
+        if len(moved) >= c.fewest and np.mean(still) > c.still and np.ptp(points) > np.deg2rad(c.moved):
+            return True
+    return False
 
 
 def _best(goal: Array, position: Array, c: RelativeChecks, summed: bool) -> bool:
@@ -70,7 +94,7 @@ def _best(goal: Array, position: Array, c: RelativeChecks, summed: bool) -> bool
                 continue
             r = float(np.corrcoef(way, asked)[0, 1])
             slope = r * float(np.std(way) / np.std(asked))
-            right = (r * r > c.explained and abs(slope - 1) < c.alike) if summed else \
+            right = (r * r > c.explained and abs(slope - 1) < c.tolerance) if summed else \
                 (r * r > c.from_place and c.least < slope < c.largest)
             if r > 0 and right:
                 return True

@@ -103,7 +103,10 @@ class CompiledSteppedRun:
         return np.asarray(self._state.q[self._job.machine.servos.joint] - self._job.physics.zero)
 
     def take(self, name: str = "simulation") -> Take:
-        """The take logged so far, from the start of the run; angles as the servos have them, no forces."""
+        """The take logged so far, from the start of the run: angles as the servos have them, no forces. RuntimeError before
+        the first `advance`."""
+        if not self._pieces:
+            raise RuntimeError("nothing was simulated yet: call advance() before take()")
         q, v, base = (np.concatenate([p[k] for p in self._pieces]) for k in range(3))
         joint = self._job.machine.servos.joint
         time = np.asarray(np.arange(len(q)) * self.config.logged_every, float)

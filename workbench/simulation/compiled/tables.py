@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from xml.etree import ElementTree
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, GeometryId, SceneGraphInspector, Shape, Sphere
@@ -27,6 +27,8 @@ from pydrake.planning import RobotDiagramBuilder
 from workbench.robot import ConfigureParser, RobotModel
 from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
 from workbench.simulation.contact import SelectFeet
+
+_VISUAL = re.compile(r"<visual\b[^>]*/>|<visual\b[^>]*>.*?</visual>", re.DOTALL)
 
 
 class NotCoveredError(Exception):
@@ -95,12 +97,8 @@ def read_tables(model: RobotModel, description: str | None, free: bool) -> Table
 
 
 def _without_visuals(text: str) -> str:
-    """The SDF without its visuals, whose meshes take long to load."""
-    tree = ElementTree.fromstring(text)
-    for link in tree.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    return ElementTree.tostring(tree, encoding="unicode")
+    """The SDF, as ElementTree writes it, without its visuals, whose meshes take long to load."""
+    return _VISUAL.sub("", text)
 
 
 class _Reader:

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from workbench.device.capture.packets import GROUP, HIRES, PRECISION, Message, Version, packet
+from workbench.device.capture.packets import GROUP, HIRES, PRECISION, Message, ServerInfo, Version, packet
 
 TICKS = 10_000_000
 """Ticks per second of the server's clock, as Windows counts them."""
@@ -197,3 +197,42 @@ class VirtualMotive:
         if self.version >= (2, 6):
             out += struct.pack("<H", 2)
         return out + (struct.pack("<f", 0.0002) if self.version >= HIRES else b"")
+
+
+class VirtualLink:
+    """An emulated server in this process; waiting costs virtual time only. delay: of each packet, either way [s]."""
+
+    def __init__(self, server: VirtualMotive, delay: float = 0.2e-3) -> None:
+        self._server, self._delay, self._now = server, delay, server.started
+        self._waiting: list[tuple[float, bytes]] = []
+
+    @property
+    def description(self) -> str:
+        """Whom this link speaks to, and through what."""
+        return "emulated server"
+
+    def now(self) -> float:
+        """Time of this link's clock [s]."""
+        return self._now
+
+    def send(self, data: bytes) -> None:
+        """Sends a packet to the server; InputError where it cannot be reached."""
+        self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
+
+    def subscribe(self, info: ServerInfo) -> None:
+        """Nothing to join: the emulated server sends to this link."""
+
+    def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        """The next packet and when it came [s], None where none comes within `timeout` [s]."""
+        end = self._now + timeout
+        self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
+        self._waiting.sort(key=lambda item: item[0])
+        if not self._waiting or self._waiting[0][0] > end:
+            self._now = end
+            return None
+        arrival, data = self._waiting.pop(0)
+        self._now = max(self._now, arrival)
+        return self._now, data
+
+    def close(self) -> None:
+        """Nothing to close."""

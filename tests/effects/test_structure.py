@@ -578,7 +578,7 @@ def test_a_urdf_takes_effects_as_an_sdf_does(tmp_path):
 
 @pytest.mark.parametrize(("name", "where", "parameters", "sentence"), [
     ("backlash", "flm", {"gap": 3.12}, "flm has 3.1 deg of free play between servo and link."),
-    ("joint_compliance", "flm", {"stiffness": 8.0}, "flm twists against its servo with 8.0 N m/rad."),
+    ("joint_compliance", "flm", {"stiffness": 8.0}, "flm is coupled to its servo with a stiffness of 8.0 N m/rad."),
     ("loose_mount", "flm", {"play": 2.0, "axis": (1.0, 0.0, 0.0)},
      "The link of flm is loose: it rocks by 2.0 deg about (1.00, 0.00, 0.00), across its servo's axis."),
     ("joint_stop", "flm", {"lower": -20.0, "upper": 30.0}, "flm goes no lower than -20.0 deg and no higher than 30.0 deg."),

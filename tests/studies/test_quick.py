@@ -10,7 +10,7 @@ import pytest
 
 from tests.shared_data import shared
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 STUDIES = sorted(name for path in (ROOT / "studies").rglob("*.py")
                  for name in re.findall(r'run_study\("(\w+)"', path.read_text(encoding="utf-8")))
 RECORDINGS = {"evidence": "data/xl330", "sts3215": "data/sts3215", "xl330": "data/xl330"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.test_view_scene import film
+from tests.view.test_scene import film
 from tests.view_takes import small_robot, swing
 from workbench.recording.take import Take
 from workbench.robot import RobotModel

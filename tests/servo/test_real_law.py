@@ -14,6 +14,7 @@ from tests.simulation_compiled.drake_steps import CompiledSteps, config_for, dra
 from workbench.effects.apply import apply_to_commands
 from workbench.files import InputError
 from workbench.motion.commands import Commands
+from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.robot import EffectSpec, ServoConstants, load_servo_constants, puppy_model
 from workbench.robot.servo_profile_file import servo_profile, with_family_law
 from workbench.servo import ServoLaw
@@ -89,7 +90,7 @@ def test_a_goal_delay_is_a_later_command_and_a_log_that_had_begun_holds_its_firs
     delay = model.with_effect(EffectSpec("command_delay", ("j",), {"delay": 0.02}))
     sent = step_to(0.5, at=0.1)
     np.testing.assert_array_equal(apply_to_commands(sent, late).times, apply_to_commands(sent, delay).times)
-    log = Commands.from_log(np.array([0.0, 0.1]), ("j",), np.array([[0.3], [0.5]]))
+    log = commands_of_rows(np.array([0.0, 0.1]), ("j",), np.array([[0.3], [0.5]]))
     for robot in (late, delay):
         heard = apply_to_commands(log, robot)
         np.testing.assert_allclose(heard.times, [0.0, 0.02, 0.12])
@@ -101,7 +102,7 @@ def test_a_servo_that_delays_its_goals_lets_go_at_once(tmp_path):
     model, late = rig_model(tmp_path, PLAIN), rig_model(tmp_path, replace(PLAIN, goal_delay=0.02))
     delay = model.with_effect(EffectSpec("command_delay", ("j",), {"delay": 0.02}))
     on = np.array([[True], [True], [False]])
-    log = Commands.from_log(np.array([0.0, 0.1, 0.2]), ("j",), np.array([[0.3], [0.5], [0.5]]), on)
+    log = commands_of_rows(np.array([0.0, 0.1, 0.2]), ("j",), np.array([[0.3], [0.5], [0.5]]), on)
     for robot, released in ((late, 0.2), (delay, 0.22)):
         heard = apply_to_commands(log, robot)
         assert heard.times[~heard.enabled[:, 0]][0] == pytest.approx(released)
@@ -139,7 +140,7 @@ def test_both_engines_play_a_log_between_steps_alike(tmp_path, changes):
     t = np.arange(0, 0.8, 0.01037)
     goals = np.where(t[:, None] < 0.4, 0.8 * np.sin(9 * t[:, None]), -0.6)
     on = (t < 0.5) | (t > 0.6)
-    commands = Commands.from_log(t, ("j",), goals, on[:, None])
+    commands = commands_of_rows(t, ("j",), goals, on[:, None])
     times = np.arange(0.0, 0.8, 0.005)
     job = Job(model, config_for("fixed", settle=0.02), commands, 0.8, 0.0, times=times, start=(np.zeros(1), np.zeros(1)))
     drake, ours = (run_job(j) for j in drake_and_compiled(job))

@@ -50,6 +50,14 @@ def test_every_servo_has_a_source_and_a_name() -> None:
     assert all(len(of["source"]) > 10 for of in servo_types().values())
 
 
+@pytest.mark.parametrize("name", ["null", "true", "No", "on", "Off"])
+def test_names_that_yaml_takes_for_something_else_are_quoted(leg: Path, name: str) -> None:
+    take = leg / f"{name}.csv"
+    take.write_text((leg / "take.csv").read_text())
+    new_robot(leg / "leg.urdf", "LX-16A", leg / "own", [take], "fixed")
+    assert [t.name for t in load_session(leg / "own").takes] == [name]
+
+
 def test_what_cannot_be_written_is_one_line(leg: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(InputError, match=r"unknown servo 'LX16'; expected one of .*LX-16A"):
         new_robot(leg / "leg.urdf", "LX16", leg)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from workbench.files import InputError
 from workbench.motion import Commands
+from workbench.recording.formats.log_commands import commands_of_rows
 
 
 def test_reference_ramps_from_where_it_is() -> None:
@@ -18,7 +18,7 @@ def test_log_keeps_only_what_changes() -> None:
     time = 3.0 + np.array([0, 0.1, 0.2, 0.3, 0.45])
     goals = np.array([[0, 1], [0, 1], [0.5, np.nan], [0.5, 1], [0.5, 1]])
     enabled = np.array([[1, 1], [1, 1], [1, 1], [1, 0], [1, 0]], dtype=bool)
-    commands = Commands.from_log(time, ("a", "b"), goals, enabled)
+    commands = commands_of_rows(time, ("a", "b"), goals, enabled)
     assert commands.times == pytest.approx([0, 0.2, 0.3])
     assert commands.goals.tolist() == [[0, 1], [0.5, 1], [0.5, 1]]
     assert commands.enabled.tolist() == [[True, True], [True, True], [True, False]]
@@ -27,10 +27,3 @@ def test_log_keeps_only_what_changes() -> None:
     assert (commands.poses == -1).all()
     every = commands.reference(time - time[0])  # at once: the reference is the goal of each sample
     assert every == pytest.approx(np.where(np.isnan(goals), 1, goals))
-
-
-def test_log_must_begin_with_a_goal() -> None:
-    with pytest.raises(InputError, match="first sample"):
-        Commands.from_log(np.arange(2.0), ("a",), np.array([[np.nan], [1.0]]))
-    with pytest.raises(InputError, match="first sample"):
-        Commands.from_log(np.zeros(0), ("a",), np.zeros((0, 1)))

@@ -18,7 +18,7 @@ from workbench.inspect.problems import model_problems_of
 from workbench.robot import RobotModel, load_model, puppy_model, save_model
 from workbench.simulation import Job, MakeStation, SimulationConfig
 
-LOG = Path(__file__).parents[1] / "data" / "tutorial_arm" / "takes" / "slow.csv"
+LOG = Path(__file__).parents[2] / "data" / "tutorial_arm" / "takes" / "slow.csv"
 BARE = """<robot name="bare">
 <link name="base">{0}</link><link name="arm">{0}</link>
 <joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>

@@ -1,0 +1,51 @@
+"""A file that is written while something happens, so that a program that is killed loses nothing of it."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from workbench.files.errors import InputError
+
+
+class AppendedFile:
+    """Appends; a file of that name must not be there. left_over: what such a file is, and what to do with it, for the message.
+    sync_every: longest time that a power cut may cost [s]; without it only `close` waits for the disk."""
+
+    def __init__(self, path: Path, left_over: str, sync_every: float = math.inf) -> None:
+        self.path, self._sync_every, self._synced = path, sync_every, time.monotonic()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        except FileExistsError:
+            raise InputError(path, left_over) from None
+        except OSError as e:
+            raise InputError(path, f"cannot be written ({e.strerror})") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def append(self, data: bytes) -> None:
+        """All of it; InputError where the disk is full."""
+        try:
+            while data:
+                data = data[os.write(self._file, data):]
+            if time.monotonic() - self._synced > self._sync_every:
+                os.fsync(self._file)
+                self._synced = time.monotonic()
+        except OSError as e:
+            raise InputError(self.path, f"cannot be written ({e.strerror}); what came before is kept") from None
+
+    def close(self) -> None:
+        """On the disk, and closed."""
+        if self._file >= 0:
+            os.fsync(self._file)
+            os.close(self._file)
+            self._file = -1
