@@ -33,7 +33,7 @@ class Scaled(Linear):
 
 def found(log_ratio, sd, options=OPTIONS, loaded=1.0):
     """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie.
-    loaded: by how much the effects do less in the second half, where a known weight hangs and torques hold more."""
+    loaded: share of the effects' response in the second half, where a known weight hangs and torques hold more."""
     names = [candidate(name) for name in ("ground_tilt", "parallel_spring", "backlash")]
     here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(3)
@@ -134,7 +134,8 @@ def test_names_that_turn_gravity_and_leave_its_size_share_their_probability():
     assert lockstep(rig, {0: fits_of_tie(here, OPTIONS, bare)})[0] is None
     tilted = plain.with_effect(names[0], np.ones(names[0].size))
     fit = lockstep(rig, {0: fitting(here, OPTIONS, tilted, 0.1, 9)})[0]
-    told = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0])
+    ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
+    told = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), ties)
     assert {n.effect for n in told.competitive} == {"ground_tilt", "parallel_spring"}
     assert told.confidence > 0.9
     assert not told.may_be_torque

@@ -75,8 +75,8 @@ class TieFits:
 
 def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[TieFits | None]:
     """Fits of the servo's torques alone, and of each effect of the tie alone, with the servo's torques at their nominal values
-    but for their variation between days. None where gravity over torque is nominal and the fit has no effect of the tie: a moved
-    centre of mass and a tilt turn gravity alike, and leave its size as it is."""
+    but for their variation between days. None where gravity over torque is nominal and the fit has no effect of the tie. A moved
+    centre of mass and a tilt both turn gravity without changing its size."""
     ratio = ratio_of(region, options, f)
     members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
     named = any(c.effect.tied == GRAVITY for c in f.hypothesis.effects)
