@@ -52,14 +52,14 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     for k, task in enumerate(tasks):
         progress(f"task {k + 1} of {len(tasks)}: {task.name}", k / len(tasks))
         walked, solved, seconds, speed = played(machine, task)
-        share = speed / asked(task)
+        share = float(speed / asked(task))
         limit = None if walked is None else binding(m for m in walked.margins if m.kind != "speed")
         broken = "" if walked is None or walked.good or limit is None else str(limit)
-        numbers[task.name] = {"solved": solved, "processor seconds": seconds, "planned": asked(task), "reached": speed,
-                              "share": share, "breaks": broken}
+        numbers[task.name] = {"solved": solved, "processor seconds": seconds, "planned": float(asked(task)),
+                              "reached": float(speed), "share": share, "breaks": broken}
         rows.append([task.name, "yes" if solved else "no", f"{seconds:.1f}", f"{asked(task):.3g}", sign(speed, 3),
                      f"{100 * share:.0f} %", broken or "nothing"])
-    reached = sum(n["share"] >= REACHED for n in numbers.values())
+    reached = sum(1 for n in numbers.values() if n["share"] >= REACHED)
     shares = [n["share"] for n in numbers.values()]
     said = (f"{reached} of {len(tasks)} tasks reach {100 * REACHED:.0f} % of the planned speed; median share "
             f"{100 * float(np.median(shares)):.0f} %.")

@@ -68,7 +68,14 @@ def taught(family: GaitFamily, robots: list[RobotModel], actions: int, options: 
         def _on_rollout_end(self) -> None:
             tell(self.num_timesteps)
 
-    side_by_side = VecMonitor(DummyVecEnv([lambda: GaitEnv(family, robots, "pose", options)] * SIDE_BY_SIDE))
+    first = GaitEnv(family, robots, "pose", options)
+
+    def another() -> GaitEnv:
+        env = GaitEnv(family, robots[:1], "pose", options)
+        env.domains = first.domains  # each robot's start is simulated once for all
+        return env
+
+    side_by_side = VecMonitor(DummyVecEnv([another] * SIDE_BY_SIDE))
     # small first actions: the gait that it begins with walks, and random poses fall
     learner = PPO("MlpPolicy", side_by_side, n_steps=ROLLOUT, batch_size=256, n_epochs=5, gamma=0.97, learning_rate=5e-4,
                   seed=SEED, device="cpu", policy_kwargs={"log_std_init": -1.5, "net_arch": [64, 64]})

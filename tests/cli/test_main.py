@@ -21,6 +21,18 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(verb in words for verb in VERBS)
 
 
+@pytest.mark.parametrize("wanted", [None, "2"])
+def test_matrices_take_one_core_unless_the_user_says_otherwise(wanted: str | None, tmp_path: Path) -> None:
+    motion = tmp_path / "motion.csv"
+    motion.write_text("time,one\n0,0\n1,5\n")
+    code = ("import os, sys; from workbench.cli.main import main; assert 'numpy' not in sys.modules; main();"
+            "assert 'numpy' in sys.modules; print(os.environ['OPENBLAS_NUM_THREADS'])")
+    kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", code, "inspect", str(motion)], check=True, capture_output=True, text=True,
+                          env=kept | ({"OPENBLAS_NUM_THREADS": wanted} if wanted else {}))
+    assert done.stdout.splitlines()[-1] == (wanted or "1")
+
+
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:

@@ -34,7 +34,7 @@ def test_what_the_motors_tolerance_covers_is_no_load():
     here, f, c = fitted(sd=0.5, size=3.0)
     tie = as_torque(here, OPTIONS, f, c)
     assert tie.by == pytest.approx(0.3)
-    assert tie.alike == pytest.approx(1.0)
+    assert tie.similarity == pytest.approx(1.0)
     assert tie.share < 0.1
     assert "35 % more" in tie.sentence
     assert "known weight" in tie.sentence

@@ -15,7 +15,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
-from workbench.identify.subset import data_subset, floors_everywhere, rebalance, subset_used
+from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -144,3 +144,16 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     assert judging(PROBLEM.deciding_part) == {PROBLEM.deciding_part}
     assert rebalance(evaluator.evidence, residuals) == list(evaluator.evidence)
     assert rebalance(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)
+
+
+def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones(two):
+    _, evaluator, _ = two
+    evidence = list(evaluator.evidence)
+    whole = sum(float(e.since[-1]) for e in evidence)
+    assert at_most(evidence, whole + 0.1) == evidence
+    shorter = at_most(evidence, 2.0)
+    assert [e.until for e in shorter] == pytest.approx([1.0, 1.0])
+    assert all(len(e.recorded) < len(w.recorded) and not (e.uses["fit"] & (e.since > e.until)).any()
+               for e, w in zip(shorter, evidence))
+    judging = replace(evidence[1], uses=dict.fromkeys(evidence[1].uses, np.zeros(len(evidence[1].recorded), dtype=bool)))
+    assert [e.until for e in at_most([evidence[0], judging], 2.0)] == pytest.approx([2.0, 0.0])

@@ -1,17 +1,21 @@
 import base64
 import gzip
+import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import capture, small_robot, swing
 from workbench.files import InputError
 from workbench.view.figures import film_strip
+from workbench.view.report.curves import Curves
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay
 
@@ -137,3 +141,51 @@ def test_a_browser_plays_the_replay_inside_the_page(tmp_path: Path) -> None:
     assert float(duration) == pytest.approx(1.44, abs=0.05)
     assert int(moving) > 10
     assert clock.endswith(" s")
+
+
+def _curves(folder: Path) -> Path:
+    model = small_robot(folder)
+    take = swing(model)
+    gap = replace(take, q=np.where(take.time[:, None] > 0.8, np.nan, take.q))
+    section = Section("Joints", [Curves(swing(model, delay=0.05), gap, ("frb", "flm"), "Joint by joint.")])
+    return Report("T", "H").add(section).write(folder / "curves.html")
+
+
+def test_curves_hold_their_numbers_and_gaps(tmp_path: Path) -> None:
+    html = _curves(tmp_path).read_text()
+    outline = Outline()
+    outline.feed(html)
+    assert outline.open == []
+    assert "http" not in html
+    (packed,) = re.findall(r'<script type="application/json">([^<]+)</script>', html)
+    content = json.loads(packed)
+    assert list(content["joints"]) == list(content["errors"]) == ["frb", "flm"]
+    assert list(content["joints"]["frb"]) == ["command", "measured", "simulated"]
+    rows = len(content["time"])
+    assert all(len(values) == rows for values in content["joints"]["flm"].values())
+    late = int(np.argmax(np.array(content["time"]) > 0.81))
+    assert content["joints"]["frb"]["measured"][late] is None
+    assert content["errors"]["frb"][late] is None
+    assert max(v for v in content["joints"]["flm"]["measured"] if v is not None) == pytest.approx(np.rad2deg(0.3), abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_browser_reads_and_zooms_the_curves(tmp_path: Path) -> None:
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("needs Chromium to look at the page")
+    path = _curves(tmp_path)
+    spy = """<script>setTimeout(() => { const c = document.querySelector("canvas"), at = () => {
+      c.dispatchEvent(new PointerEvent("pointermove", {clientX: c.getBoundingClientRect().right - 12,
+        clientY: c.getBoundingClientRect().top + 9})); return document.querySelector("output").textContent; };
+      const all = at(); document.querySelector("[data-do=in]").click();
+      document.title = all + "|" + at(); }, 500)</script></body>"""
+    path.write_text(path.read_text().replace("</body>", spy))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
+             "--virtual-time-budget=3000", "--dump-dom"]
+    dom = subprocess.run([chromium, *flags, path.as_uri()], capture_output=True, text=True, timeout=120).stdout
+    (title,) = re.findall(r"<title>([^<]*)</title>", dom)[:1]
+    whole, zoomed = title.split("|")
+    assert float(whole.split(" s:")[0]) > 1.1
+    assert 0.5 < float(zoomed.split(" s:")[0]) < 0.95
+    assert "simulated" in zoomed

@@ -64,7 +64,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
-    from workbench.view.report.words import hidden_effects
+    from workbench.view.report.words import hidden_effects, said_aside
 
     session, before = load_session(path), None if previous is None else Path(previous)
     told = check_session("diagnose", session, yes)
@@ -83,6 +83,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
         print(f"  {finding_line(finding)}")
     for unknown in diagnosis.unknown_torques:
         print(f"  {unknown_line(unknown)}")
+    for sentence in said_aside(diagnosis.provenance):
+        print(f"  {sentence.rstrip('.')}")
     for sentence in hidden_effects(diagnosis.provenance.get("cannot_show", {})):
         print(f"  {sentence.replace('**', '').rstrip('.')}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")

@@ -97,6 +97,8 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
     logging.getLogger("drake").addFilter(_serious)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     forget_warnings()
+    if alone:  # matrices are small and rollouts run side by side: further threads would only wait for each other
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
         warnings.simplefilter("ignore")
         os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too

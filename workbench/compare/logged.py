@@ -10,14 +10,23 @@ import numpy as np
 from workbench.compare.session_takes import ReadTake
 from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
 
+_CHANGED = ("taken out", "left out", "set right", "evidence ends", "turned back", "undone")
+"""How a line ends that reports a change of the log, and not only a doubt."""
+
 
 def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
-    """For provenance: notes by take, and by joint the law that the register of duty tells; empty where there is nothing to
-    say."""
+    """For provenance: by take notes and the readings that were set aside, and by joint the law that the register of duty tells;
+    empty where there is nothing to say."""
     notes = {t.spec.name: list(t.recording.notes) for t in takes if t.recording.notes}
     laws = {joint: str(law) for joint, law in register_laws(takes).items()}
     found: dict[str, Any] = {"logs": notes} if notes else {}
-    return found | ({"duty_registers": laws} if laws else {})
+    aside = {t.spec.name: lines for t in takes if (lines := set_aside(t.recording.problems))}
+    return found | ({"duty_registers": laws} if laws else {}) | ({"set_aside": aside} if aside else {})
+
+
+def set_aside(problems: Sequence[str]) -> list[str]:
+    """Those of a recording's problems that say which readings were corrected, or excluded from the evidence."""
+    return [text for text in problems if any(word in text for word in _CHANGED)]
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:

@@ -101,8 +101,8 @@ def torque_gap(log: TorqueLog, model: RobotModel, link: str | None = None) -> To
 
 
 def compared(logs: Mapping[str, TorqueLog], gaps: Mapping[str, TorqueGap], model: RobotModel) -> str:
-    """By how much the second of two logs carries more than the first, both weighed on the link that explains the larger gap:
-    errors of the model, equal in both, cancel. Empty for one log, or where neither shows a load."""
+    """The additional load of the second of two logs against the first, in a sentence, both weighed on the link that explains
+    the larger gap: errors of the model, equal in both, cancel. Empty for one log, or where neither shows a load."""
     if len(logs) != 2:
         return ""
     found = [gap.load for gap in gaps.values() if gap.load is not None]

@@ -56,7 +56,7 @@ class Ensemble:
         confidence bound."""
         rng = np.random.default_rng([seed, 20])
         legs = sorted({j for leg in legs_of(model) for j in leg.joints}) if count else []
-        spread = self._spread(count, seed) if even else [{} for _ in range(count)]
+        spread: list[dict[str, float]] = self._spread(count, seed) if even else [{} for _ in range(count)]
         return [self._draw(model, legs, rng, folder, values) for values in spread]
 
     def _spread(self, count: int, seed: int) -> list[dict[str, float]]:

@@ -62,6 +62,30 @@ def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
     return [e.looked_at(until[i]) for i, e in enumerate(evidence)]
 
 
+def beginnings(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
+    """The beginnings of takes, of so many seconds together, in equal parts but for takes that are shorter; nothing of takes that
+    only validate."""
+    lengths = sorted(float(e.since[-1]) for e in evidence if _is_fitted(e))
+    until, left = np.inf, seconds
+    for k, length in enumerate(lengths):  # short takes are looked at to their end
+        if length * (len(lengths) - k) > left:
+            until = left / (len(lengths) - k)
+            break
+        left -= length
+    ends = [until if _is_fitted(e) else 0.0 for e in evidence]
+    return [e if np.isinf(end) else e.looked_at(end) for e, end in zip(evidence, ends)]
+
+
+def at_most(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
+    """Takes as they are if those that fit last no longer together, else their beginnings."""
+    lasts = sum(float(e.since[-1]) for e in evidence if _is_fitted(e))
+    return list(evidence) if lasts <= seconds else beginnings(evidence, seconds)
+
+
+def _is_fitted(e: TakeEvidence) -> bool:
+    return bool(e.uses["fit"].any() or e.uses["choose"].any())
+
+
 def _power(e: TakeEvidence, residual: Array) -> Array:
     """Excess beyond noise (N, c), in frames that may be used."""
     seen = e.uses["fit"] | e.uses["choose"]

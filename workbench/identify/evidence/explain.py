@@ -7,8 +7,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from workbench.identify.evidence.checks import checks, drifts, refuted
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
@@ -29,6 +27,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
 from workbench.identify.search_result import Problem
+from workbench.identify.subset import at_most, beginnings
 from workbench.robot import RobotModel
 from workbench.types import Progress
 
@@ -42,7 +41,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     """Searches each joint's effects by evidence."""
     options = problem.options
     whole, nominal, progress = problem.evaluator, problem.nominal, problem.progress
-    evaluator = whole.on(_begun(whole.evidence, options.seconds))
+    evaluator = whole.on(beginnings(whole.evidence, options.seconds))
+    last = whole.on(at_most(whole.evidence, options.finished))
     evidence = evaluator.evidence
     joints = [j for j in nominal.joints if any(j in e.channels for e in evidence)]
     felt = [c for c in problem.pool if c.where != (nominal.base,)]
@@ -70,18 +70,18 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         progress("an unnamed torque", None)
         rollouts, found = _beside_unnamed(with_best(rollouts, found), found, options)
     progress("numbers at a finer step", None)
-    entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
+    entire = tuple(replace(_region(j, last.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
     finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
-    fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=whole, regions=entire, errors=step_errors(whole, entire))
-    last = lockstep(fine, finishing)
-    found = tuple(last[k] for k in range(len(found)))
+    fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=last, regions=entire, errors=step_errors(last, entire))
+    done = lockstep(fine, finishing)
+    found = tuple(done[k] for k in range(len(found)))
     fine = with_best(fine, found)
     everywhere = Whole(fine, (), options)
     together = everywhere.fitted(everywhere.start([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
-    drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
+    drifting = tuple(d for f in found for d in drifts(f.region, f.best, last.evidence))
     return Explanation(nominal, replace(with_best(rollouts, found), shared=together.shared), found, believed, robot,
                        tuple(rejected), options, problem.played.missed, drifting, stopped,
                        tuple(ties.get(k) for k in range(len(found))))
@@ -117,23 +117,6 @@ def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: Evidenc
     return with_best(rollouts, found), found
 
 
-def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
-    """The beginnings of takes that are not for validation alone, of so many seconds together."""
-    told = [e for e in evidence if e.uses["fit"].any() or e.uses["choose"].any()]
-    lengths = sorted(float(e.since[-1]) for e in told)
-    until, left = np.inf, seconds
-    for k, length in enumerate(lengths):  # short takes are looked at to their end
-        if length * (len(lengths) - k) > left:
-            until = left / (len(lengths) - k)
-            break
-        left -= length
-    return [_looked_at(e, until if any(e is t for t in told) else 0.0) for e in evidence]
-
-
-def _looked_at(e: TakeEvidence, until: float) -> TakeEvidence:
-    return e if math.isinf(until) else e.looked_at(until)
-
-
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
             ) -> Region:
     numbers = (uncertain_numbers(nominal, joint, False, options.sheet) if options.drift is None
@@ -142,7 +125,7 @@ def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, p
 
 
 def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:
-    """The best fit with the last numbers, from whole takes; among the others it stays as likely as the search found it."""
+    """The best fit with the last numbers, from all that is used; among the others it stays as likely as the search found it."""
     best = found.best
     (r,) = yield [best.hypothesis]
     region = entire.correlated(found.region.likelihood.tau)

@@ -81,7 +81,8 @@ class EvidenceOptions:
     stick and slip, fits of one model end up to 20 nats apart, and an effect would win only for lack of a better plain fit. beam:
     states that are extended, and single-effect moves fitted for each; refined: fitted moves of one or two effects, led of
     them sharing their first effect; paired: best moves that are also predicted in pairs. most: effects of one joint. seconds: of
-    all takes together that the search uses, from their beginnings; the last fit uses everything. most_work [s]: of a puppy's
+    all takes together that the search uses, from their beginnings; finished: of all takes together that the last
+    fit uses, twice as long, as its rollouts have a finer step. most_work [s]: of a puppy's
     rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one
     processor, several times the cost of twelve servo logs.
 
@@ -91,8 +92,8 @@ class EvidenceOptions:
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
-    less likely with it by this much, odds of twenty. alike: an effect is tied to torque if scaling every torque reproduces at
-    least this share of its response. apart: gravity over torque is reported where it differs from the nominal by so many standard
+    less likely with it by this much, odds of twenty. similarity: an effect is tied to torque if scaling every torque reproduces
+    at least this share of its response. apart: gravity over torque is reported where it differs from the nominal by so many standard
     deviations, its variation between days included. sure: standard errors by which a servo's own register must contradict an
     effect, and refuted: the share of the effect's typical size that is then ruled out, which no recording would show.
     """
@@ -119,10 +120,11 @@ class EvidenceOptions:
     grown: float = 1.5
     far: float = 3.0
     seconds: float = 100.0
+    finished: float = 200.0
     most_work: float = 2e6
     occam: float = 7.0
     veto: float = 3.0
-    alike: float = 0.5
+    similarity: float = 0.5
     apart: float = 2.0
     drift: SinceThen | None = None
     formal: float = 3.0

@@ -31,11 +31,11 @@ TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_frict
 @dataclass(frozen=True)
 class AsTorque:
     """An effect compared with a change of the servo's torque scale. by: the change of its logarithm that resembles the effect
-    most; alike: the share of the effect's response that this change reproduces; share: probability that it is the effect, where
+    most; similarity: the share of the effect's response that this change reproduces; share: probability of the effect, where
     both explain the same; known: standard deviation of the logarithm of the servo's common torque scale in the prior."""
 
     by: float
-    alike: float
+    similarity: float
     share: float
     known: float
 
@@ -43,7 +43,7 @@ class AsTorque:
         """Of the effect's sizes (k, k): no better known along `size` (k,) than the torques are that do the same, whatever a fit
         claims (`formal`), as no angle tells the two apart."""
         along = size / max(float(np.linalg.norm(size)), 1e-12)
-        least = self.alike * float(size @ size) * (self.known / max(abs(self.by), 1e-6))**2
+        least = self.similarity * float(size @ size) * (self.known / max(abs(self.by), 1e-6))**2
         return np.asarray(formal + max(0.0, least - float(along @ formal @ along)) * np.outer(along, along))
 
     @property
@@ -65,8 +65,8 @@ def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate)
     precision = region.likelihood.precision(f.r, f.discrepancy)
     does, torques = f.J[:, own] @ h.theta[own], f.J[:, :len(more)] @ more
     both, size = float(does @ (precision * torques)), float(torques @ (precision * torques))
-    by, alike = both / max(size, 1e-12), both**2 / max(size * float(does @ (precision * does)), 1e-12)
-    if alike < options.alike:
+    by, similarity = both / max(size, 1e-12), both**2 / max(size * float(does @ (precision * does)), 1e-12)
+    if similarity < options.similarity:
         return None
     torque = -0.5 * float(np.sum(np.square(h.z + by * more) - np.square(h.z)))
     nothing = h.theta.copy()
@@ -75,7 +75,7 @@ def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate)
     density = float(prior.log(h.theta) - prior.log(nothing)) + float(np.sum(prior.at_center[own]))
     occam = 0.5 * c.size * math.log(2 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1])
     effect = density + occam + log_odds(len(region.candidates), options.expected)
-    return AsTorque(by, alike, 1.0 / (1.0 + math.exp(min(torque - effect, 700.0))), float(1.0 / np.linalg.norm(more)))
+    return AsTorque(by, similarity, 1.0 / (1.0 + math.exp(min(torque - effect, 700.0))), float(1.0 / np.linalg.norm(more)))
 
 
 def all_torques(numbers: Sequence[Uncertain]) -> Array:

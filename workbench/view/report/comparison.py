@@ -24,6 +24,7 @@ from workbench.view.figures import (
 )
 from workbench.view.figures.errors import LIMIT
 from workbench.view.playback import common_span
+from workbench.view.report.curves import Curves
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay
 
@@ -104,6 +105,9 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         figure = joint_overlay(joint, take.simulated, take.recorded, noise=_finite_or_none(c.noise),
                                floor=_finite_or_none(c.floor), stance=by_joint(recorded, model))
         parts.append(Picture(figure, _about(joint, c)))
+    if take.joints:
+        parts.append(Curves(take.simulated, take.recorded, take.joints_by_error(),
+                            "The joints one by one, the one with the largest error first; zero is the first command."))
     noise = {j: c.noise for j, c in take.joints.items()}
     parts.append(Details("All joints", [
         Picture(joint_grid(take.simulated, take.recorded, noise=noise, joints=sorted(take.joints),

@@ -35,6 +35,7 @@ from workbench.view.report.words import (
     probable,
     quantity,
     rival_of,
+    said_aside,
     sentence_of,
     this_or,
     title_of,
@@ -61,7 +62,8 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     """The page without its replays."""
     known = dict(diagnosis.provenance)
     seed, seconds = known.pop("seed", None), known.pop("seconds", None)
-    known.pop("cannot_show", None)  # in the summary
+    for name in ("cannot_show", "set_aside"):  # in the summary
+        known.pop(name, None)
     more = [(k, ", ".join(f"{a} {b}" for a, b in v.items()) if isinstance(v, dict) else str(v))
             for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
     report = Report(title, headline(diagnosis), _summary(diagnosis, takes), _key_numbers(diagnosis, takes),
@@ -107,6 +109,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     what += [f"Log {name}: {note}." for name, notes in diagnosis.provenance.get("logs", {}).items() for note in notes
              if "stamped" in note]
+    what += said_aside(diagnosis.provenance)
     what += hidden_effects(diagnosis.provenance.get("cannot_show", {}))
     if why := diagnosis.provenance.get("engine", {}).get("because"):
         what.append(f"All rollouts are Drake's, as {why}.")

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from workbench.files.reading import read_text, write_whole
 from workbench.robot.model import RobotModel
 from workbench.view.figures import encode
+from workbench.view.report.curves import Curves, curves_html
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Details:
     parts: Sequence[Part]
 
 
-Part: TypeAlias = Text | Table | Picture | Replay | Details
+Part: TypeAlias = Text | Table | Picture | Replay | Curves | Details
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class Report:
     def html(self) -> str:
         """The page; it asks nothing from the network."""
         assets = files("workbench.view").joinpath("assets")
-        style, script = (assets.joinpath(name).read_text(encoding="utf-8") for name in ("report.css", "report.js"))
+        style = assets.joinpath("report.css").read_text(encoding="utf-8")
         body = [f"<header><p class=kicker>{escape(self.title)}</p><h1>{_inline(self.headline)}</h1>"]
         if self.summary:
             body.append(_render(Text(self.summary)).replace("<p>", "<p class=lead>"))
@@ -134,12 +135,14 @@ class Report:
         body += [_section(s) for s in self.sections]
         source = "".join(f"<span><b>{escape(name)}</b> {escape(value)}</span>" for name, value in self.provenance.items())
         body.append(f"<footer>{source}</footer>")
-        uses_replay = 'class="replay"' in "".join(body)
+        used = {"replay": "report.js", "curves": "curves.js"}
+        scripts = [assets.joinpath(name).read_text(encoding="utf-8") for kind, name in used.items()
+                   if any(f'<figure class="{kind}"' in part for part in body)]
         return (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
             f"<title>{escape(self.title)}</title>\n<style>\n{style}</style></head>\n<body><main>\n"
-            + "\n".join(body) + "\n</main>" + (f"\n<script>\n{script}</script>" if uses_replay else "") + "</body></html>\n"
+            + "\n".join(body) + "\n</main>" + "".join(f"\n<script>\n{script}</script>" for script in scripts) + "</body></html>\n"
         )
 
     def write(self, path: str | Path) -> Path:
@@ -163,6 +166,8 @@ def _render(part: Part) -> str:
             return f"<figure><div class=wide>{_image(figure, caption)}</div>{_caption(caption)}</figure>"
         case Replay():
             return _replay(part)
+        case Curves():
+            return curves_html(part)
         case Details(summary, parts):
             return f"<details><summary>{_inline(summary)}</summary>{''.join(map(_render, parts))}</details>"
     raise TypeError(f"expected a part of a report, got {type(part).__name__}")

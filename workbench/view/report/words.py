@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
@@ -231,3 +232,9 @@ def capital(text: str) -> str:
 def unbroken(text: str) -> str:
     """Kept on one line."""
     return text.replace(" ", "\u00a0")
+
+
+def said_aside(provenance: Mapping[str, Any]) -> list[str]:
+    """A sentence for each correction of a log, and for each stretch that was excluded from the evidence."""
+    aside = provenance.get("set_aside", {})
+    return [f"Set aside in {take}: {line.rstrip('.')}." for take, lines in aside.items() for line in lines]
