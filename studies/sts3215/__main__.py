@@ -67,7 +67,7 @@ def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outc
     false = tuple(f.effect for f in said if f.effect not in case.effects)
     if case.loaded is None:
         ties = [t for t in diagnosis.tied
-                if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
+                if {n.effect for n in t.competitive} & set(case.effects) and (t.confidence >= SAID or not t.since)]
         measured = [t for t in ties if t.since]
     else:  # the known weight leaves the servo's torques as the only cause
         measured = ties = [t for t in diagnosis.tied if t.may_be_torque and not t.competitive]
