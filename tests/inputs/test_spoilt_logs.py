@@ -6,10 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from tests.command import main
 from workbench.files import InputError
 from workbench.recording import read_recording
+from workbench.recording.formats.file_kind import file_kind
 
 COUNT = 360 / 4096
 RATE = 100
@@ -153,6 +156,32 @@ def test_a_table_written_another_way_is_refused_with_the_remedy(tmp_path: Path, 
         _problems(tmp_path, write(_text(_columns()).strip().split("\n")))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("log.csv", "time,variable,value\n0,goal.hip,1\n0,position.hip,1\n", "one number in each row"),
+    ("log.json", '[{"time": 0, "goal.hip": 1}]', "a list of records: write CSV"),
+    ("log.jsonl.json", '{"time": 0}\n{"time": 1}\n', "JSON lines"),
+    ("log.csv", "<!DOCTYPE html><title>Not found</title>", "on GitHub take the raw file"),
+])
+def test_other_ways_to_keep_a_log_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str,
+                                            said: str) -> None:
+    (tmp_path / name).write_text(content)
+    main(["inspect", str(tmp_path / name)])
+    out = capsys.readouterr()
+    assert said in out.out + out.err
+
+
+def test_a_number_sign_in_a_name_and_a_second_sheet(tmp_path: Path) -> None:
+    path = tmp_path / "log #3.csv"
+    path.write_text(_text(_columns()))
+    assert file_kind(path) == "recording"
+    assert read_recording(path).problems == ()
+    book = tmp_path / "log.xlsx"
+    with pd.ExcelWriter(book) as sheets:
+        pd.DataFrame({"note": ["a log"]}).to_excel(sheets, sheet_name="notes", index=False)
+        pd.DataFrame(_columns()).to_excel(sheets, sheet_name="log", index=False)
+    assert read_recording(book).joints == ("hip", "knee")
 
 
 @pytest.mark.parametrize("word", ["NA", "null", "None", "#N/A"])

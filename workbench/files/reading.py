@@ -78,6 +78,9 @@ def parse_json(path: str | Path, text: str, place: str = "") -> Any:
         return json.loads(text, parse_int=_bounded_int, parse_float=_finite_float, parse_constant=_finite_float)
     except json.JSONDecodeError as e:
         at = place or f"line {e.lineno}, "
+        if e.msg == "Extra data" and not place and text[e.pos:e.pos + 1] == "{":
+            raise InputError(path, f"line {e.lineno}: JSON lines, one object for each row: write CSV with pandas' "
+                                   "read_json(FILE, lines=True).to_csv('log.csv', index=False)") from None
         raise InputError(path, f"{at}column {e.colno}: {e.msg}; expected whole JSON") from None
     except RecursionError:
         raise InputError(path, f"{place}nested too deep; expected JSON of a few levels") from None

@@ -340,8 +340,12 @@ def _inverse_dynamics(path: Path) -> Inspection:
 
 
 def _page(path: Path) -> Inspection:
+    strange = () if path.suffix.lower() in (".html", ".htm") else (
+        f"a web page called {path.suffix or 'a file'}: the link of the page was saved, not the file; on "
+        "GitHub take the raw file",)
     title = re.search(r"<title>([^<]{0,200})", plain_head(path).decode("utf-8", "replace"))
-    return Inspection(str(path), "page", details={"title": title[1].strip() if title else "", "open": "in a web browser"})
+    return Inspection(str(path), "page", problems=strange,
+                      details={"title": title[1].strip() if title else "", "open": "in a web browser"})
 
 
 def _figure(path: Path) -> Inspection:

@@ -44,6 +44,9 @@ def read_bam_log(path: str | Path) -> Recording:
         if _is_calibration(content):
             raise InputError(source, "a calibration file of LeRobot (ids, homing offsets and ranges of servos), no recording; "
                                      "expected a BAM log, a JSON object with a list 'entries'")
+        if isinstance(content, list) and content and isinstance(content[0], dict):
+            raise InputError(source, "a list of records: write CSV with pandas' read_json(FILE).to_csv('log.csv', index=False); "
+                                     "expected a BAM log, a JSON object with a list 'entries'")
         raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)

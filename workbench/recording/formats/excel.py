@@ -1,4 +1,4 @@
-"""Excel workbooks (xlsx): the first sheet, read as the table that it would be as CSV."""
+"""Excel workbooks (xlsx): the first sheet that is a recording, read as the table that it would be as CSV."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def matches(head: bytes) -> bool:
 
 
 def read_excel(path: Path) -> Recording:
-    """Reads the first sheet by the format that its header says. InputError where the workbook is damaged or the sheet is of no
-    known format."""
+    """Reads the first sheet whose header is that of a known format. InputError where the workbook is damaged or
+    no sheet is one."""
     import pandas as pd
 
     source = str(path)
@@ -33,25 +33,28 @@ def read_excel(path: Path) -> Recording:
         with zipfile.ZipFile(regular_file(path, _MOST)) as packed:
             if sum(entry.file_size for entry in packed.infolist()) > 8 * _MOST:
                 raise InputError(source, "an Excel workbook that is too large when unpacked; save the sheet as CSV")
-        sheet = pd.read_excel(path, sheet_name=0, header=None, engine="openpyxl")
+        sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
     except InputError:
         raise
     except _DAMAGED as e:
         raise InputError(source, f"an Excel workbook that is damaged ({' '.join(str(e).split())[:120]}); save the sheet as "
                                  f"CSV") from None
     with tempfile.TemporaryDirectory() as folder:
-        table = Path(folder) / "sheet.csv"
-        sheet.to_csv(table, header=False, index=False)
-        known = format_of(plain_head(table))
-        if known is None:
-            from workbench.recording.formats.foreign import refusal
+        for n, (name, sheet) in enumerate(sheets.items()):
+            table = Path(folder) / f"sheet{n}.csv"
+            sheet.to_csv(table, header=False, index=False)
+            known = format_of(plain_head(table))
+            if known is None:
+                continue
+            try:
+                read = known.read(table)
+            except InputError as e:
+                raise InputError(source, f"sheet '{name}': {e.problem}") from None
+            return replace(read, source=source, metadata={**read.metadata, "written with": f"Excel, sheet '{name}'"})
+        from workbench.recording.formats.foreign import refusal
 
-            raise InputError(source, f"first sheet: {refusal(table, plain_head(table)).problem}")
-        try:
-            read = known.read(table)
-        except InputError as e:
-            raise InputError(source, f"first sheet: {e.problem}") from None
-    return replace(read, source=source, metadata={**read.metadata, "written with": "Excel, the first sheet"})
+        first = Path(folder) / "sheet0.csv"
+        raise InputError(source, f"first sheet: {refusal(first, plain_head(first)).problem}")
 
 
 FORMAT = RecordingFormat("excel", "an Excel workbook (xlsx)", matches, read_excel)

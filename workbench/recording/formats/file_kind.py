@@ -17,7 +17,7 @@ Kind = Literal["recording", "motion", "rollout"]
 def file_kind(path: str | Path) -> Kind:
     """A recording of a known format, a rollout by its first line, a motion by its columns (or a ROBOTIS file), else a recording.
     InputError where there is no such file."""
-    path = Path(str(path).partition("#")[0])
+    path = Path(path) if Path(path).exists() else Path(str(path).partition("#")[0])
     if path.suffix.lower() == ".mtn":
         return "motion"
     if path.is_dir():

@@ -11,7 +11,7 @@ from workbench.files import InputError
 from workbench.files.kinds import kind_of_file, lfs_pointer
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary
-from workbench.recording.formats.odd_tables import odd_table
+from workbench.recording.formats.odd_tables import long_table, odd_table
 from workbench.recording.formats.registry import known_formats
 from workbench.recording.formats.table_header import table_header
 
@@ -85,6 +85,8 @@ def _column(name: str) -> _Column:
 def joint_columns(names: Sequence[str]) -> bool:
     """Whether a table's columns are, by other names, goals and positions of joints, or angles and torques: no motion."""
     columns = [_column(name) for name in names]
+    if long_table(names):
+        return True
     if _pairs(columns) or _bare_pair(columns):
         return True
     torques = [c for c in columns if re.fullmatch(r"(?i)(.*[._/ ])?(tau|torque|effort)([._/ \[].*)?", c.plain)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary, split_row
@@ -22,7 +23,17 @@ def odd_table(head: bytes) -> str | None:
         return "the file holds blank lines alone"
     if lines[0].lstrip().startswith("{") and len(lines) > 1 and lines[1].lstrip().startswith("{"):
         return "JSON lines, one object for each row: write CSV with pandas' read_json(FILE, lines=True).to_csv(..., index=False)"
+    if long_table(split_row(lines[0])):
+        return ("a table with one number in each row: give each channel a column, with pandas' pivot(index='time', columns=..., "
+                "values='value')")
     return _header_below(text.splitlines()) or _transposed(lines)
+
+
+def long_table(names: Sequence[str]) -> bool:
+    """Whether a header is that of a table with one number in each row: time, the channel's name, its value."""
+    lower = {name.lower() for name in names}
+    kinds = {"variable", "name", "channel", "signal", "joint", "topic", "key"}
+    return 3 <= len(lower) <= 4 and "value" in lower and bool(lower & kinds)
 
 
 def _odd_bytes(head: bytes) -> str | None:
