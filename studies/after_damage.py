@@ -52,7 +52,7 @@ LOOSE = (10.0, 20.0)
 TURNS, PACES = np.linspace(-0.15, 0.15, 5), (-1.0, -0.7, 0.5, 0.75, 1.0, 1.2)
 HOPELESS = 0.1
 """Share of the healthy robot's speed below which the diagnosed model's predictions are not used; the nominal ones are then."""
-CONFIG = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
+CONFIG = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_period=0.01)
 
 
 @dataclass(frozen=True)
