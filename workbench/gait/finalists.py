@@ -18,6 +18,9 @@ from workbench.gait.space import space_of
 from workbench.robot import RobotModel
 from workbench.types import Progress
 
+TRIMMED = 4
+"""How often a finalist is steered at most until it keeps the limit on drift: a search allows ten times that limit."""
+
 
 @dataclass(frozen=True)
 class Screening:
@@ -39,7 +42,7 @@ def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Seque
     candidates = [c for c in (found.best, *found.others) if c.nominal is not None]
     for k, candidate in enumerate(candidates):
         progress(f"finalist {k + 1} of {len(candidates)}: trimmed on the nominal robot", None)
-        (walked,) = steered(nominal, space, nominal.judged([candidate.shape], 0))
+        (walked,) = steered(nominal, space, nominal.judged([candidate.shape], 0), TRIMMED)
         for count in screening.rounds:
             if not walked.good or not fresh:
                 break

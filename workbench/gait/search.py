@@ -248,16 +248,16 @@ class _Refiner:
         self.best = min(self.best, *(judged[k] for k in better), key=Candidate.rank) if better else self.best
 
 
-def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> list[Candidate]:
+def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
     """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
-    need not be searched for. First by as much as it turns, then by the secant of two runs."""
+    need not be searched for. First by as much as it turns, then by the secant of two runs, `times` in all."""
     request, out = evaluator.request, list(candidates)
     if "turn" not in space.names or request.way == "turn":
         return out
     low, high = (float(end[space.names.index("turn")]) for end in (space.low, space.high))
     before: dict[int, Candidate] = {}
     last = dict(enumerate(candidates))
-    for _ in range(STEERED):
+    for _ in range(times):
         tried = {}
         for k, c in last.items():
             if c.nominal is not None and not c.nominal.fell and any(m.kind == "straying" and m.use > 1 for m in c.margins):
