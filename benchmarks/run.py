@@ -49,7 +49,7 @@ LOG, LOG_QUICK, LOG_DIAGNOSED = 4.0, 0.3, 2.4
 """Duration of the log that is fitted, also in the quick form, and of the one that is diagnosed [s]."""
 TURNS = 2
 MODELS, LOG_TURNS = 50, 5
-CAPTURED, CAPTURED_QUICK = (5.0, 7), (0.6, 1)
+CAPTURED, CAPTURED_QUICK = (5.0, 7), (1.1, 1)
 """Length of the take [s] and turns of rollouts of captured takes, also in the quick form."""
 
 

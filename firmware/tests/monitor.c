@@ -4,9 +4,6 @@
 #define FOUND 400u          /* ms until a servo's fault has to be noticed */
 #define LET_GO 12000u       /* ms until torque has to be off then: a ramp turns 150 deg in 5 s, and is given 2 s more */
 #define STARTING 2400u      /* ms after a reset in which servos that start are waited for */
-#define RAMP 45u            /* moving speed of a ramp, 30 deg/s */
-#define HALF 512u           /* torque limit of the first ramp */
-#define NEAR 14u            /* counts about neutral by which a joint is lifted and let down */
 #define NEVER 0xFFFFFFFFu
 
 void monitor_begin(struct monitor *m, uint32_t joints, bool power_on) {
@@ -18,6 +15,7 @@ void monitor_begin(struct monitor *m, uint32_t joints, bool power_on) {
     m->reset_at = 0;
     for (uint32_t j = 0; j < joints; j++) {
         m->before[j] = false;
+        m->yields[j] = true;
         m->hears_since[j] = NEVER;
         m->goal_before[j] = 0;
         m->bad_since[j] = NEVER;
@@ -31,9 +29,14 @@ static void broken(struct monitor *m, uint32_t rule, uint32_t ms, uint32_t joint
     m->rule_joint = joint;
 }
 
-static bool neutral(const struct monitor_joint *j) {
-    uint32_t away = j->goal > j->neutral ? (uint32_t)(j->goal - j->neutral) : (uint32_t)(j->neutral - j->goal);
-    return away <= NEAR && j->speed >= 1u && j->speed <= RAMP;
+static uint32_t away(const struct monitor_joint *j, uint16_t goal) {
+    return goal > j->neutral ? (uint32_t)(goal - j->neutral) : (uint32_t)(j->neutral - goal);
+}
+
+/* Whether a new goal only brings the joint back: neutral, or a step towards it, at no more than a ramp's speed. */
+static bool back(const struct monitor_joint *j, uint16_t before) {
+    uint32_t far = away(j, before);
+    return away(j, j->goal) <= (far > j->near ? far : j->near) && j->speed >= 1u && j->speed <= j->ramp;
 }
 
 static bool due(uint32_t since, uint32_t ms, uint32_t after) { return since != NEVER && ms - since > after; }
@@ -57,18 +60,19 @@ static void look_at(struct monitor *m, uint32_t ms, uint32_t k) {
     const struct monitor_joint *j = &m->joint[k];
     bool rose = j->torque && !m->before[k];
     bool other_goal = j->goal != m->goal_before[k];
+    if (other_goal || away(j, j->goal) <= j->near) m->yields[k] = back(j, m->goal_before[k]);
     m->before[k] = j->torque;
     m->goal_before[k] = j->goal;
     if (!j->hears) m->hears_since[k] = NEVER;
     else if (m->hears_since[k] == NEVER) m->hears_since[k] = ms;
     if (rose && !m->allowed) broken(m, RULE_TORQUE_RETURNED, ms, k);
     if (!j->torque) return;
-    if (rose && !m->any_before && !m->raw && (j->limit > HALF || j->speed > RAMP)) broken(m, RULE_FIRST_TORQUE, ms, k);
+    if (rose && !m->any_before && !m->raw && (j->limit > j->half || j->speed > j->ramp)) broken(m, RULE_FIRST_TORQUE, ms, k);
     if (j->goal < j->low || j->goal > j->high) broken(m, RULE_BOUNDS, ms, k);
-    if (j->speed == 0 || (j->speed > j->fastest && j->speed > RAMP)) broken(m, RULE_SPEED, ms, k);
+    if (j->speed == 0 || (j->speed > j->fastest && j->speed > j->ramp)) broken(m, RULE_SPEED, ms, k);
     if (!j->hears || m->deaf) return;
     if (due(m->release_at, ms, AFTER_STOP) && ms - m->hears_since[k] > AFTER_STOP) broken(m, RULE_HELD_ON, ms, k);
-    if (due(m->stop_at, ms, AFTER_STOP) && other_goal && !neutral(j)) broken(m, RULE_MOVED_AFTER_STOP, ms, k);
+    if (due(m->stop_at, ms, AFTER_STOP) && other_goal && !m->yields[k]) broken(m, RULE_MOVED_AFTER_STOP, ms, k);
 }
 
 /* Something has been wrong with a joint for long, while others move on, or hold on for ever. */
@@ -76,7 +80,7 @@ static void look_for_what_is_wrong(struct monitor *m, uint32_t ms, bool any) {
     bool moving = false;
     for (uint32_t k = 0; k < m->joints; k++) {
         const struct monitor_joint *j = &m->joint[k];
-        moving = moving || (j->torque && !neutral(j) && j->hears && ms - m->hears_since[k] > AFTER_STOP);
+        moving = moving || (j->torque && !m->yields[k] && j->hears && ms - m->hears_since[k] > AFTER_STOP);
     }
     for (uint32_t k = 0; k < m->joints; k++) {
         const struct monitor_joint *j = &m->joint[k];

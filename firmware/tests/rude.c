@@ -172,6 +172,9 @@ static void begin(struct rude_run *run) {
         monitor.joint[j].high = table_high(run->table, j);
         monitor.joint[j].fastest = table_fastest(run->table, j);
         monitor.joint[j].neutral = table_neutral(run->table, j);
+        monitor.joint[j].ramp = 45;  /* 30 deg/s */
+        monitor.joint[j].half = 512;
+        monitor.joint[j].near = 14;  /* by which a joint is lifted and let down */
     }
     monitor_begin(&monitor, rude.sim.joints, true);
     monitor.deaf = false;

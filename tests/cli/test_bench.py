@@ -62,7 +62,7 @@ def test_quick_bench_prints_and_writes_every_figure(tmp_path: Path, capsys: pyte
             required.add(name)
             within = figure["value"] >= figure["requirement"].get("at_least", 0)
             assert figure["met"] == (within and figure["value"] < figure["requirement"].get("below", np.inf))
-    required_not = ("station_against_mujoco", "fit_against", "servo_log", "fast", "diagnose")
+    required_not = ("station_against_mujoco", "fit_against", "servo_log", "fast", "diagnose", "captured")
     measured = {n for n in plausible if "skipped" not in said["figures"][n]}
     assert required == {n for n in measured if not n.startswith(required_not)}
 

@@ -180,6 +180,11 @@ def test_failures_must_be_a_share_of_all_questions_too(answers, unsteady):
     assert (asked(answers, WatchOptions(failures=3)).doubted is not None) is unsteady
 
 
+def test_the_reason_counts_answers_and_questions():
+    assert asked("a-a-a-a-").reaction.reason == (
+        "servo 1 (one): answered only 4 of 8 questions within 0.3 s; is its plug loose, or does another servo have its ID?")
+
+
 def test_the_questions_of_a_motion_are_counted_from_its_beginning():
     w = asked("a---")
     w.begin(0.17)

@@ -33,7 +33,7 @@ class Scaled(Linear):
 
 def found(log_ratio, sd, options=OPTIONS, loaded=1.0):
     """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie.
-    loaded: by how much the effects do less in the second half, where a known weight hangs and torques hold more."""
+    loaded: share of the effects' response in the second half, where a known weight hangs and torques hold more."""
     names = [candidate(name) for name in ("ground_tilt", "parallel_spring", "backlash")]
     here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(3)
@@ -121,3 +121,22 @@ def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
     assert "arm carries 200 g more" in tie.in_words()
     assert "spring" not in tie.in_words()
     assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]
+
+
+def test_names_that_turn_gravity_and_leave_its_size_share_their_probability():
+    names = [candidate(name) for name in ("ground_tilt", "parallel_spring")]
+    here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.06),))
+    torque, turned = np.random.default_rng(3).normal(size=(2, 1600)) * 0.1
+    does = {"torque_at_full_duty": torque} | {f"{c.name}.{c.parameters[0].name}": SHIFT * turned for c in names}
+    rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=4.0 * SHIFT * turned, does=does)
+    plain = start(here.numbers)
+    bare = lockstep(rig, {0: fitting(here, OPTIONS, plain, 0.1, 9)})[0]
+    assert lockstep(rig, {0: fits_of_tie(here, OPTIONS, bare)})[0] is None
+    tilted = plain.with_effect(names[0], np.ones(names[0].size))
+    fit = lockstep(rig, {0: fitting(here, OPTIONS, tilted, 0.1, 9)})[0]
+    ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
+    told = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), ties)
+    assert {n.effect for n in told.competitive} == {"ground_tilt", "parallel_spring"}
+    assert told.confidence > 0.9
+    assert not told.may_be_torque
+    assert "while gravity over torque is 1.00" in told.change

@@ -92,6 +92,13 @@ def test_the_worst_joint_is_the_one_nearest_to_its_own_limit(machine, monkeypatc
     assert worst.where.startswith(machine.model.joints[1])
 
 
+@pytest.mark.parametrize(("touched", "use"), [(0, 0.0), (1, 0.5), (2, 1.0), (3, 1.0 + 3 / 20)])
+def test_two_of_twenty_robots_may_touch_with_other_links(machine, touched, use):
+    draws = [replace(WALKED, touched=True)] * touched + [WALKED] * (20 - touched)
+    assert margins(machine, draws)["other contact over draws"] == Margin(
+        "other contact over draws", "of 20 robots", float(touched), 2.0, "robots whose links touch", pytest.approx(use))
+
+
 def test_robots_that_fell_do_not_hide_behind_a_share(machine):
     assert draw_margins(machine, Request(), [fallen(15)] * 3) == []
     assert set(margins(machine, [WALKED, fallen(15)])) == set(margins(machine, [WALKED]))

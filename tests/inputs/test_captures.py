@@ -1,4 +1,4 @@
-"""Motive exports: what was not seen, what the header says wrongly, and how a spreadsheet wrote it."""
+"""Motive exports: gaps, wrong headers, exchanged names, and tables that a spreadsheet wrote."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _every_fourth(cells: list[list[str]]) -> None:
 
 
 def _coarse_and_frozen(cells: list[list[str]]) -> None:
-    """To a millimetre, which hides the noise, and held while the body goes on."""
+    """To a millimetre, which hides the noise, and held while the body moves."""
     for row in cells[HEADER:]:
         row[2:6], row[6:9] = [f"{float(c):.4f}" for c in row[2:6]], [f"{float(c):.3f}" for c in row[6:9]]
     _frozen(cells)
@@ -181,6 +181,20 @@ def test_z_up_is_seen_and_turned(made) -> None:
     assert not any("z is up" in p for p in upright.problems)
     np.testing.assert_allclose(lying.p, upright.p, atol=1e-12)
     np.testing.assert_allclose(np.abs(np.sum(lying.q * upright.q, axis=-1)), 1, atol=1e-12)
+
+
+def test_names_that_are_exchanged_and_mirrored_captures_are_told(made) -> None:
+    model, captured = made
+    bodies = dict(captured.recording.rigid_bodies)
+    assert not any("exchanged" in p or "mirror" in p for p in mend(tracks_of(captured.recording), model).problems)
+    first = {name: np.nanmedian(body.p[:10], axis=0) for name, body in bodies.items()}
+    a, b = max(((a, b) for a in first for b in first if a < b), key=lambda pair: np.linalg.norm(first[pair[0]] - first[pair[1]]))
+    wrong = replace(captured.recording, rigid_bodies=bodies | {a: bodies[b], b: bodies[a]})
+    told = mend(tracks_of(wrong), model).problems
+    assert any("begin in each other's places" in p and f"'{a}'" in p and f"'{b}'" in p for p in told)
+    mirrored = {name: BodyTrack(body.p * [1, 1, -1], body.quat * [1, -1, -1, 1]) for name, body in bodies.items()}
+    told = mend(tracks_of(replace(captured.recording, rigid_bodies=mirrored)), model).problems
+    assert any("mirror image" in p for p in told)
 
 
 @pytest.mark.parametrize("factor", [0.001, 0.1, 10.0, 1000.0])

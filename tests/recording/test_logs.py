@@ -289,3 +289,12 @@ def test_a_joint_that_never_moves_has_the_noise_of_its_kinds_count(tmp_path, mod
     channels = {f"{what}.{joint}": values for what in ("goal", "position") for joint, values in zip(joints, (moving, 0 * time))}
     measurement = register(read_recording(write_joint_log(tmp_path / "log.csv", time, channels)), model, None)
     assert measurement.noise[joints[1]] == pytest.approx(count / np.sqrt(12), rel=0.01)
+
+
+def test_a_file_is_read_again_where_it_has_changed(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,goal.one,position.one\n0,0,0\n0.1,5,1\n0.2,5,4\n")
+    first = read_recording(path)
+    assert read_recording(path) is first
+    path.write_text(path.read_text().replace("0.2,5,4", "0.2,5,3"))
+    assert read_recording(path).channels["position.one"][2] < first.channels["position.one"][2]

@@ -85,6 +85,7 @@ class MonitorJoint(ctypes.Structure):
 
     _fields_ = [
         ("low", ctypes.c_uint16), ("high", ctypes.c_uint16), ("fastest", ctypes.c_uint16), ("neutral", ctypes.c_uint16),
+        ("ramp", ctypes.c_uint16), ("half", ctypes.c_uint16), ("near", ctypes.c_uint16),
         ("torque", ctypes.c_bool), ("answers", ctypes.c_bool), ("hot", ctypes.c_bool), ("overloaded", ctypes.c_bool),
         ("hears", ctypes.c_bool), ("goal", ctypes.c_uint16), ("speed", ctypes.c_uint16), ("limit", ctypes.c_uint16),
     ]
@@ -107,6 +108,7 @@ class Monitor:
         core().monitor_begin(ctypes.byref(self.state), joints, allowed)
         for joint in self.state.joint:
             joint.low, joint.high, joint.fastest, joint.neutral = 300, 900, 400, 512
+            joint.ramp, joint.half, joint.near = 45, 512, 14
         self.joints(answers=True, hears=True, goal=512, speed=40, limit=1023)
 
     def joints(self, **values: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import csv
 import functools
+import math
 import random
 import tempfile
 from dataclasses import dataclass, field
@@ -18,13 +19,15 @@ import numpy as np
 
 from tests.device.servos import Robot, arm, robot
 from tests.rude.host_faults import ASKED, AT_ANSWERS, AT_WRITES, ENDS_IT, FAULTS, PASSING, WHOLE_RUN
-from tests.rude.monitor import Monitor, Sample
+from tests.rude.monitor import Allowed, Held, Monitor, Sample
 from workbench.device.bus import BusError
 from workbench.device.bus.survey import survey
 from workbench.device.play import PlayOptions, perform
 from workbench.device.stop import Stop
+from workbench.device.virtual import VirtualServo
 from workbench.files import InputError
 from workbench.motion import Motion
+from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile
 
@@ -40,6 +43,10 @@ EVERY = (3, 5, 7, 11, 17, 29, 53, 97)
 """Of the events, for faults that pass."""
 CLOCKS = {"fast clock": 1.01, "slow clock": 0.99}
 """The host's seconds in one of the servos'."""
+HOT = 69.0
+"""A servo this hot is about to shut itself down, at 70 deg C."""
+FULL = {"AX-12A": 1023, "XL-330": 885, "STS3215": 1000}
+"""Torque limits as the servos leave the factory [counts]."""
 FAMILIES = ("AX-12A", "XL-330", "STS3215")
 
 
@@ -49,6 +56,16 @@ def _model() -> RobotModel:
     folder = tempfile.TemporaryDirectory()
     atexit.register(folder.cleanup)
     return arm(Path(folder.name))
+
+
+def _allowed(family: str, commands: Commands) -> Allowed:
+    """Limits that the player keeps in this motion, 5 % wider, as registers are rounded."""
+    profile, options = servo_profile(family), PlayOptions()
+    ramp = math.ceil(1.05 * 2 * options.ramp_speed / profile.speed_unit)
+    fastest = math.ceil(1.05 * float(commands.speeds.max()) / profile.speed_unit)
+    half = math.ceil(options.start_torque * FULL[family])
+    return Allowed(0, 2 * profile.centre, profile.centre, fastest, ramp, half,
+                   math.ceil(1.05 * options.seat / profile.count))
 
 
 @dataclass
@@ -62,6 +79,8 @@ class Run:
     robot: Robot = field(init=False)
     struck: list[float] = field(init=False, default_factory=list)
     excused: set[int] = field(init=False, default_factory=set)
+    unheard: set[int] = field(init=False, default_factory=set)
+    """Servos whose answers cannot be understood from now on."""
     stop: Stop = field(init=False, default_factory=Stop)
     events: int = field(init=False, default=0)
     armed: bool = field(init=False, default=False)
@@ -129,21 +148,27 @@ class Run:
             r.port.latency, r.port.jitter = 1e-3 * (self.k % 17), 1e-3 * (self.k % 17) * (self.seed % 2)
         self._set_clock()
         commands = MOTION.commands(2)
-        monitor, profile = Monitor(fastest=1.05 * float(commands.speeds.max())), servo_profile(self.family)
+        profile = servo_profile(self.family)
+        monitor = Monitor(_allowed(self.family, commands))
         bus = r.bus()
         found = survey(bus, r.model, ids=())
         self.install()
         self.armed = True
 
         servos, sense = list(r.servos.values()), r.body.sense
-        centre, count, unit = profile.centre, profile.count, profile.speed_unit
+        centre, count, hot = profile.centre, profile.count, HOT
+
+        def held(v: VirtualServo, now: int) -> Held:
+            hears = v.powered and not v.starting(now)
+            return Held(v.powered and v["torque_enable"] != 0, v["goal_position"], v["moving_speed"], v["torque_limit"],
+                        hears and v.joint not in self.unheard, hears, v.temperature >= hot, v.overload)
 
         def sample() -> None:
             now = r.wire.clock.now
             monitor.samples.append(Sample(
-                self.now, {v.joint: v.powered and v["torque_enable"] != 0 for v in servos},
+                self.now, {v.joint: held(v, now) for v in servos},
                 {v.joint: (v["goal_position"] - centre) * count for v in servos},
-                {v.joint: sense(v.joint, now).angle for v in servos}, {v.joint: v["moving_speed"] * unit for v in servos}))
+                {v.joint: sense(v.joint, now).angle for v in servos}, r.port.unplugged))
             r.at(0.002 if self.armed else 0.01, sample)
 
         r.at(0.0, sample)
@@ -156,12 +181,11 @@ class Run:
         self.armed = False
         r.wire.clock.advance(r.wire.clock.now + 72_000_000)
         monitor.excused = self.excused
-        out = monitor.too_fast()
+        asked = self.struck if self.fault in ASKED else []
         gone = r.port.unplugged
+        out = monitor.broken(asked[:1], [*([asked[0] + 0.02] if asked and self.fault == "ctrl-c twice" else []), ended])
         if not gone:
-            out += monitor.after_release(ended) + monitor.torque_at_the_end()
-        if self.struck and self.fault in ASKED:
-            out += monitor.after_stop(self.struck[0]) if self.fault == "ctrl-c" else monitor.after_release(self.struck[-1] + 0.03)
+            out += monitor.moves_after_release(ended) + monitor.torque_at_the_end()
         if result is None:
             return out if said else [*out, "ended without a word"]
         out += self._told(monitor, result, commands, ended)

@@ -43,6 +43,7 @@ def _once(do: Callable[[Run], None]) -> Callable[[Run, list[int]], list[int] | N
 
 def _mute(run: Run) -> None:
     run.robot.servos["two"].mute = True
+    run.unheard.add(2)
 
 
 def _hot(run: Run) -> None:
@@ -81,11 +82,13 @@ def _twin(run: Run) -> None:
     one = run.robot.servos["two"]
     twin = VirtualServo(run.robot.wire, one.profile, one.ident, run.robot.body, joint=99, seed=run.seed + 1)
     twin["return_delay_time"] = 0
+    run.unheard.add(one.ident)
 
 
 def _deaf(run: Run) -> None:
     """The host's own packets still go out."""
     run.robot.port.hear = lambda times, values, garbled, rate: None
+    run.unheard |= set(run.robot.model.bus_ids.values())
 
 
 def _level_1(run: Run) -> None:

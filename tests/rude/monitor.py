@@ -1,77 +1,107 @@
-"""Judges a playing from outside: from what servos hold and where joints are, sampled, and from when somebody asked for something.
+"""Judges a playing from outside. The rules for every robot are those of firmware/tests/monitor.c; those of poses and of the log,
+which only the host's player has, are here.
 
 Shares no code with the player, the bus or the emulated servos: all it gets are numbers.
 """
 
 from __future__ import annotations
 
+import ctypes
 from bisect import bisect_left
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+
+from tests.firmware.native import core
+from tests.rude.controller import RULES, MonitorState
+
+LATER = 10_000
+"""Added to all times [ms]: the monitor excuses servos that are silent in the first seconds, when they may still be starting."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A servo's registers [counts], and how it truly is: answers in a way that could be understood; hears: has power and has
+    started."""
+
+    torque: bool
+    goal: int
+    speed: int
+    limit: int
+    answers: bool
+    hears: bool
+    hot: bool
+    overloaded: bool
 
 
 @dataclass(frozen=True)
 class Sample:
-    """At a time [s]: by servo, whether it has torque, its goal and angle [rad], and its commanded speed [rad/s] (0: no limit)."""
+    """At a time [s], by servo: its state, its goal and its angle [rad]. deaf: nobody can hear anything."""
 
     time: float
-    torque: dict[int, bool]
+    held: dict[int, Held]
     goal: dict[int, float]
     angle: dict[int, float]
-    speed: dict[int, float]
+    deaf: bool = False
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What every joint may do [counts]: bounds of its goals and neutral, its speed, a ramp's speed, the torque limit of the first
+    ramp, and how far from neutral is no distance."""
+
+    low: int
+    high: int
+    neutral: int
+    fastest: int
+    ramp: int
+    half: int
+    near: int
 
 
 @dataclass
 class Monitor:
-    """samples: in order of time. excused: servos that nobody can reach any more (power or cable gone). fastest: allowed speed of
-    a goal [rad/s]."""
+    """samples: in order of time. excused: servos that nobody can release any more, as their power or cable is gone."""
 
-    fastest: float
+    allowed: Allowed
     samples: list[Sample] = field(default_factory=list)
     excused: set[int] = field(default_factory=set)
 
-    def after_release(self, time: float, grace: float = 0.05) -> list[str]:
-        """What moved, or had torque again, later than `grace` after all torque was asked to go [s]."""
-        out = []
-        late = [s for s in self.samples if s.time > time + grace]
-        for servo in self._judged():
-            on = [s.time for s in late if s.torque[servo]]
-            if on:
-                out.append(f"servo {servo} has torque {on[0] - time:.3f} s after the release")
-            moved = [s.angle[servo] for s in late]
-            if moved and max(moved) - min(moved) > 0.02:
-                out.append(f"servo {servo} moves by {max(moved) - min(moved):.3f} rad after the release")
-        return out
+    def broken(self, stops: list[float], releases: list[float]) -> list[str]:
+        """The first of the rules for every robot that is broken. stops, releases: when they were asked for [s]; until the first
+        the robot is meant to play."""
+        state, judged = MonitorState(), list(self.samples[0].held)
+        core().monitor_begin(ctypes.byref(state), len(judged), True)
+        for joint in state.joint[:len(judged)]:
+            for name, value in asdict(self.allowed).items():
+                setattr(joint, name, value)
+        first = min([*stops, *releases])
+        requests = sorted([(time, 2) for time in stops] + [(time, 4) for time in releases])
+        for sample in self.samples:
+            asked = int(sample.time < first)
+            while requests and requests[0][0] <= sample.time:
+                asked |= requests.pop(0)[1]
+            state.deaf = sample.deaf
+            for joint, servo in zip(state.joint, judged):
+                held = sample.held[servo]
+                joint.torque, joint.answers, joint.hears = held.torque, held.answers, held.hears
+                joint.hot, joint.overloaded = held.hot, held.overloaded
+                joint.goal, joint.speed, joint.limit = held.goal, held.speed, held.limit
+            core().monitor_look(ctypes.byref(state), LATER + round(1000 * sample.time), asked)
+            if state.rule:
+                return [f"{RULES[state.rule]}: servo {judged[state.rule_joint]} at {sample.time:.3f} s"]
+        return []
 
-    def after_stop(self, time: float, grace: float = 0.05) -> list[str]:
-        """Goals that go away from neutral later than `grace` after a stop [s]."""
+    def moves_after_release(self, time: float, grace: float = 0.05) -> list[str]:
+        """Joints that move later than `grace` after all torque was asked to go [s]."""
         out = []
         for servo in self._judged():
-            last = None
-            for s in self.samples:
-                if s.time < time + grace or not s.torque[servo]:
-                    continue
-                if last is not None and abs(s.goal[servo]) > last + 0.01:
-                    out.append(f"servo {servo}: goal goes from {last:.3f} to {abs(s.goal[servo]):.3f} rad from neutral "
-                               f"{s.time - time:.3f} s after the stop")
-                    break
-                last = abs(s.goal[servo])
-        return out
-
-    def too_fast(self) -> list[str]:
-        """Servos with torque that are told to go at once, or faster than allowed, to where they are not."""
-        out = []
-        for servo in self._judged():
-            for s in self.samples:
-                far = abs(s.goal[servo] - s.angle[servo]) > 0.05
-                if s.torque[servo] and far and not 0 < s.speed[servo] <= self.fastest:
-                    away = s.goal[servo] - s.angle[servo]
-                    out.append(f"servo {servo}: {s.speed[servo]:.2f} rad/s to a goal {away:.2f} rad away, at {s.time:.3f} s")
-                    break
+            angles = [s.angle[servo] for s in self.samples if s.time > time + grace]
+            if angles and max(angles) - min(angles) > 0.02:
+                out.append(f"servo {servo} moves by {max(angles) - min(angles):.3f} rad after the release")
         return out
 
     def torque_at_the_end(self) -> list[str]:
         """Servos that nobody released."""
-        return [f"servo {servo} still has torque" for servo in self._judged() if self.samples[-1].torque[servo]]
+        return [f"servo {servo} still has torque" for servo in self._judged() if self.samples[-1].held[servo].torque]
 
     def poses_missed(self, poses: list[tuple[float, float, dict[int, float]]], near: float) -> list[str]:
         """Poses, as from, to [s] and goals [rad], of which a servo never held the goal within `near` [rad] in that time."""
@@ -95,4 +125,4 @@ class Monitor:
         return out
 
     def _judged(self) -> list[int]:
-        return [servo for servo in self.samples[0].torque if servo not in self.excused]
+        return [servo for servo in self.samples[0].held if servo not in self.excused]

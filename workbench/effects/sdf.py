@@ -65,11 +65,12 @@ class SdfRobot:
     def kinematics(self) -> Kinematics:
         """Of the robot as it is now, but for its masses; parsed once for the same changes of joints and lengths."""
         key = tuple(self._built)
-        if key not in _kinematics:
-            _kinematics[key] = Kinematics.from_text(self.text(), self.path)
+        known = _kinematics.get(key)
+        if known is None:  # rollouts are made in threads, and another may drop what this one keeps
+            known = _kinematics[key] = Kinematics.from_text(self.text(), self.path)
             while len(_kinematics) > KEPT:
                 _kinematics.popitem(last=False)
-        return _kinematics[key]
+        return known
 
     def add_play(self, joint: str, gap: float) -> None:
         """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""

@@ -106,8 +106,9 @@ class _Performance:
         slow = dict.fromkeys(rig.ids, self.options.ramp_speed)
         self._look_at_stop()
         self._energised = True
-        rig.limit_torque(self.options.start_torque)
+        rig.limit_torque(self.options.start_torque, check=True)
         rig.send(self.goals, slow)
+        rig.check_speeds()
         rig.torque(True)
         rig.send(self.goals, slow)  # families that forget a goal while torque is off
         self._watchdog(self.options.watchdog)

@@ -69,6 +69,8 @@ class Rig:
         self._goals: dict[str, float] = {}
         self._suspects: list[str] = []
         self._open: set[str] = set()
+        self._unanswered: Counter[str] = Counter()
+        self._unsure: set[str] = set()
         self.repaired, self.missed = 0, 0
         self._asked_since = self._heard_since = False
         self.readings: Counter[str] = Counter()
@@ -97,13 +99,16 @@ class Rig:
         """Goals [rad] and moving speeds [rad/s] in one packet; returns when it was handed over [s].
 
         Speed 0, at once, is never sent: a joint that was told this goal before keeps the speed at which it goes there, any other
-        gets the slow one."""
-        self.missed += len(self._open & goals.keys())
+        gets the slow one. A joint whose servo may have restarted gets none, as a goal might switch its torque on, at full force,
+        until its registers show that it has not."""
+        unsure = {joint for joint in self._unsure if not self._mute(joint)}
+        self.missed += len((self._open | unsure) & goals.keys())
         self._open -= goals.keys()
         if self._asked_since and not self._heard_since:  # nobody answered in the whole pose, so that nobody knows of its goals
             self.missed += len(self._goals.keys() & goals.keys())
         self._asked_since = self._heard_since = False
-        return self._send(goals, speeds)
+        sure = {joint: goal for joint, goal in goals.items() if joint not in unsure}
+        return self._send(sure, speeds) if sure else self.bus.now()
 
     def _send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
         profile = self.bus.profile
@@ -126,8 +131,7 @@ class Rig:
         except NoAnswerError:
             return
         self.watch.answered(servo, self.bus.now(), found, self.bus.alarms.get(servo, ()))
-        marker = self.bus.profile.marker
-        if found["torque_enable"] and (not marker or found[marker]):
+        if self._runs(found):
             self._send({joint: self._goals[joint]}, {joint: 0.0})
             self.repaired += 1
 
@@ -140,9 +144,21 @@ class Rig:
                 self.bus.write(servo, {"torque_enable": int(on)})
             self.journal.write(t=self.bus.now(), torque={joint: on})
 
-    def limit_torque(self, share: float) -> None:
-        """Torque limits of every joint at a share of the values found."""
-        self.bus.sync_write({self.ids[j]: {"torque_limit": round(share * found)} for j, found in self.torque_limits.items()})
+    def limit_torque(self, share: float, check: bool = False) -> None:
+        """Torque limits of every joint at a share of the values found. check: read back, and written again where it did not
+        arrive; BusError where it never does."""
+        limits = {self.ids[j]: {"torque_limit": round(share * found)} for j, found in self.torque_limits.items()}
+        self.bus.sync_write(limits)
+        for servo, limit in limits.items() if check else ():
+            if self.bus.read(servo, "torque_limit") != limit:
+                self.bus.write(servo, limit)
+
+    def check_speeds(self) -> None:
+        """Before torque comes on: whether the speeds that were sent have arrived, as a servo without one moves as fast as it
+        can."""
+        for joint, (_, speed) in self._told.items():
+            if self.bus.read(self.ids[joint], "moving_speed")["moving_speed"] != speed:
+                self.bus.write(self.ids[joint], {"moving_speed": speed})
 
     def release(self, seconds: float = RELEASE) -> tuple[str, ...]:
         """Torque off, broadcast and read back; repeated for so long [s] for servos that do not answer. Returns the joints
@@ -187,10 +203,13 @@ class Rig:
 
     def _names(self, at_once: bool, turns: int) -> tuple[str, ...]:
         """The next reading."""
+        doubtful = any(not self._unanswered[j] for j in self._unsure)
         if at_once:
+            if doubtful and self._turn % 2:
+                return self._limp
             turn = self._turn % (4 * STATE_EVERY)
             return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
-        turn = self._turn // turns % LIMP_EVERY
+        turn = 0 if doubtful else self._turn // turns % LIMP_EVERY
         if turn == 0:
             return (*self._limp, GOAL, *POSITION) if self._together else (*STATE, *self._limp)
         return STATE if turn % 2 else (GOAL, *POSITION)
@@ -212,6 +231,7 @@ class Rig:
                 if not self._suspects:  # those after it may only have waited for its answer
                     self._suspects.append(joint)
                     self.watch.silent(self.ids[joint], bus.now())
+                self._miss(joint)
                 continue
             self._take(joint, values, begun + k * each, bus.now() - begun)
 
@@ -238,14 +258,35 @@ class Rig:
                 values |= bus.read(servo, *self._limp)
         except NoAnswerError:
             self.watch.silent(servo, bus.now())
+            self._miss(joint)
             return
         self._take(joint, values, asked, took)
+
+    def _miss(self, joint: str) -> None:
+        self._unanswered[joint] += 1
+        if self._unanswered[joint] >= self.watch.options.confirm:
+            self._unsure.add(joint)
+
+    def _mute(self, joint: str) -> bool:
+        """Whether it has been silent for longer than a start takes, or answers badly: it may hear all the same."""
+        if self.ids[joint] == self.watch.doubted:
+            return True
+        since = self.bus.now() - self.watch.heard(self.ids[joint])
+        return self._unanswered[joint] > 0 and since >= self.watch.options.silent
+
+    def _runs(self, values: Mapping[str, int]) -> bool:
+        """Whether its registers show torque, and that it has not restarted."""
+        marker = self.bus.profile.marker
+        return bool(values["torque_enable"] and (not marker or values[marker]))
 
     def _take(self, joint: str, values: Mapping[str, int], time: float, took: float = 0.0) -> None:
         """Judges a reading, and logs it; time: when the servo measured it [s]. took: until the answer was there [s]."""
         bus, servo = self.bus, self.ids[joint]
         self._heard_since = True
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
+        self._unanswered[joint] = 0
+        if "torque_enable" in values:
+            (self._unsure.discard if self._runs(values) else self._unsure.add)(joint)
         if "present_position" not in values:
             return
         angle = self.servos[joint].angle(values["present_position"])

@@ -114,6 +114,10 @@ class VirtualServo:
         self._put(self.profile.by_name["goal_position"], self._count(angle))
         self._steer(now)
 
+    def starting(self, now: int) -> bool:
+        """Whether it hears nothing yet, or writes its EEPROM, at a time [ticks]."""
+        return now < self._deaf_until
+
     # Packets
 
     def receive(self, packet: Instruction, time: int) -> None:

@@ -93,8 +93,8 @@ class EvidenceOptions:
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
     less likely with it by this much, odds of twenty. similarity: an effect is tied to torque if scaling every torque reproduces
-    at least this share of its response. apart: gravity over torque is reported where it differs from the nominal by so many standard
-    deviations, its variation between days included. sure: standard errors by which a servo's own register must contradict an
+    at least this share of its response. apart: gravity over torque is reported where it is this many standard deviations
+    off nominal, its variation between days included. sure: standard errors by which a servo's own register must contradict an
     effect, and refuted: the share of the effect's typical size that is then ruled out, which no recording would show.
     """
 

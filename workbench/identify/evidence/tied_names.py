@@ -75,10 +75,12 @@ class TieFits:
 
 def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[TieFits | None]:
     """Fits of the servo's torques alone, and of each effect of the tie alone, with the servo's torques at their nominal values
-    but for their variation between days. None where gravity over torque is nominal."""
+    but for their variation between days. None where gravity over torque is nominal and the fit has no effect of the tie. A moved
+    centre of mass and a tilt both turn gravity without changing its size."""
     ratio = ratio_of(region, options, f)
     members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
-    if ratio is None or not members or not ratio.is_apart(options):
+    named = any(c.effect.tied == GRAVITY for c in f.hypothesis.effects)
+    if ratio is None or not members or not (named or ratio.is_apart(options)):
         return None
     told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
     rest = [(c, x) for c, x in f.hypothesis.sizes() if c.effect.tied != GRAVITY]
@@ -121,7 +123,7 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
 
 def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None
                         ) -> GravityOverTorque | None:
-    """The tie as it is reported; None where gravity over torque is nominal. fits: of `fits_of_tie`."""
+    """The tie as it is reported; None where nothing of it has changed. fits: of `fits_of_tie`."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or fits is None or not fits.names:
         return None

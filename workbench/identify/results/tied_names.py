@@ -51,8 +51,11 @@ class GravityOverTorque:
     def change(self) -> str:
         """The ratio in a sentence."""
         low, high = self.ratio.low, self.ratio.high
-        return (f"Gravity over torque in {', '.join(self.where)} is {self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times "
-                f"that of the {'earlier model' if self.since else 'files'}.")
+        joints, before = ", ".join(self.where), "earlier model" if self.since else "files"
+        told = f"{self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times that of the {before}"
+        if low <= 1.0 <= high:  # type: ignore[operator]
+            return f"Gravity acts otherwise on {joints} than in the {before}, while gravity over torque is {told}."
+        return f"Gravity over torque in {joints} is {told}."
 
     @property
     def may_be_torque(self) -> bool:

@@ -60,11 +60,11 @@ def read_recording(path: str | Path) -> Recording:
     path, part = split_part(Path(path))
     known = _format(path)
     key = (str(path), part, _digest(path))
-    if key[2] and key in _read_before:
-        _read_before.move_to_end(key)
-        return _read_before[key]
-    found = _read(path, part, known)
-    _read_before[key] = found
+    found = _read_before.pop(key, None) if key[2] else None
+    if found is None:
+        found = _read(path, part, known)
+    if key[2]:
+        _read_before[key] = found  # the last to be dropped
     while len(_read_before) > 1 and sum(map(_size, _read_before.values())) > KEPT:
         _read_before.popitem(last=False)
     return found

@@ -3,6 +3,7 @@ mention."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -19,13 +20,18 @@ _NEAR = 0.2
 _SHARE = 0.25
 """Of the robot's size: how badly the bodies must lie with y up, to ask whether z is; of that, how well they then must."""
 
+_ODD = 0.1
+"""Of the robot's size: how badly the bodies must lie, to ask whether they are mirrored or exchanged."""
+_BETTER = 0.4
+"""A mirrored or exchanged arrangement must fit so many times as badly at most."""
+
 
 def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
     """Tracks in metres with z up in the model's axes, as the robot's links say where the file's header is wrong; told."""
     found = _laid_out(tracks, model)
     if found is None:
         return tracks
-    places, links = found
+    names, places, links = found
     problems = list(tracks.problems)
     factor = _power_of_ten(places, links)
     if factor != 1:
@@ -38,6 +44,8 @@ def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
     if as_said > _SHARE * size and turned_up < 2 * _SHARE * as_said:
         problems.append("heights and links say that z is up in this export, not y; turned")
         p, q = _z_up(p), np.concatenate([q[..., :1], _z_up(q[..., 1:])], axis=-1)
+    elif as_said > _ODD * size and (text := _arrangement(names, places, links)) is not None:
+        problems.append(text)
     return replace(tracks, p=p, q=q, problems=tuple(problems)) if problems != list(tracks.problems) else tracks
 
 
@@ -47,13 +55,33 @@ def layout_yaw(tracks: Tracks, model: RobotModel) -> float | None:
     found = _laid_out(tracks, model)
     if found is None:
         return None
-    places, links = (p - p.mean(axis=0) for p in found)
+    places, links = (p - p.mean(axis=0) for p in found[1:])
     spread = float(np.sqrt(np.mean(np.sum(links[:, :2] ** 2, axis=1))))
     return -_turn(places, links) if spread > 0.02 else None
 
 
-def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[Array, Array] | None:
-    """Where bodies were at first, and their links' centres of mass in the neutral pose, (A, 3) each; None where too few tell."""
+def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | None:
+    """A line for first places (A, 3) that fit the links (A, 3) far better mirrored, or with two bodies exchanged."""
+    now = _misfit(places, links)
+    mirrored = _misfit(places * np.array([1.0, -1.0, 1.0]), links)
+    pairs = {}
+    for a, b in combinations(range(len(places)), 2):
+        order = np.arange(len(places))
+        order[[a, b]] = b, a
+        pairs[a, b] = _misfit(places[order], links)
+    (a, b), exchanged = min(pairs.items(), key=lambda pair: pair[1])
+    if min(mirrored, exchanged) > _BETTER * now:
+        return None
+    if mirrored <= exchanged:
+        return ("the bodies' first places are the mirror image of the robot's links: are the capture's axes left-handed, or are "
+                "all bodies of the left and the right exchanged? Export again with right-handed axes, or correct `rigid_bodies`")
+    return (f"bodies '{names[a]}' and '{names[b]}' begin in each other's places: are their names exchanged? Correct "
+            "`rigid_bodies` in the session, or the names in the capture")
+
+
+def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[tuple[str, ...], Array, Array] | None:
+    """Names of bodies (A), their first places, and their links' centres of mass in the neutral pose, (A, 3) each; None where too
+    few tell."""
     at = _first_places(tracks)
     if len(at) < _LEAST or any(tracks.assets[i] not in model.rigid_bodies for i in at):
         return None
@@ -65,7 +93,7 @@ def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[Array, Array] | None:
             return None
         p, R = poses[link]
         nominal.append(p[0] + R[0] @ model.kinematics.centers.get(link, np.zeros(3)))
-    return np.array(list(at.values())), np.array(nominal)
+    return tuple(tracks.assets[i] for i in at), np.array(list(at.values())), np.array(nominal)
 
 
 def _turn(a: Array, b: Array) -> float:
