@@ -51,11 +51,14 @@ TESTED = 4
 def taught(family: GaitFamily, robots: list[RobotModel], actions: int, options: LearningOptions,
            tell: Callable[[int], None]) -> tuple[Policy, list[float]]:
     """The policy after `actions` actions, and the mean reward of an episode over each tenth of them."""
+    import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
     from workbench.gait.learning.environment import GaitEnv
+
+    torch.set_num_threads(1)  # the network is small, and threads that wait for one another cost more than they save
 
     class Heard(BaseCallback):
         rewards: list[float]
