@@ -142,8 +142,8 @@ def test_bad_bam_logs(tmp_path):
     backwards["entries"][3]["timestamp"] = 0.0
     for text, message in ((whole[:-30], "line 1, column .* expected whole JSON"), ("{}", "a list 'entries'"),
                           (json.dumps(bad), r"entries\[3\]: key 'position' is missing"),
-                          (json.dumps(backwards), r"entries\[3\].timestamp: time 0 does not follow 0.01; expected increasing "
-                                                  r"times"),
+                          (json.dumps(backwards), r"entries\[3\].timestamp: time 0 does not follow 0.01: the times start "
+                                                  r"again"),
                           (whole.replace('"speed": 0.5', '"speed": "fast"', 1), r"entries\[0\].speed: expected a number, got")):
         path.write_text(text)
         with pytest.raises(InputError, match=message):
