@@ -22,6 +22,7 @@ FOUND = [
     ("AX-12A", "twin", 248, 726),
     ("STS3215", "twin", 358, 16),
     ("STS3215", "twin", 371, 17),
+    ("AX-12A", "brown-out", 117, 817),
     ("AX-12A", "twin", 255, 176),
     ("AX-12A", "brown-out", 300, 3),
     ("XL-330", "garbled command", 7, 3),

@@ -37,6 +37,8 @@ RELEASE = 1.0
 """How long torque off is said again to servos that do not confirm it [s]."""
 DOUBTED = 0.1
 """How much longer than it may stay silent a doubted servo's readings are left out of the log [s]: the time a reaction takes."""
+STARTS = 0.05
+"""A servo that was heard this recently has not restarted [s]: a start takes 0.2 to 0.4 s (emanual issue 1698 for an XC-330)."""
 LIMP_EVERY = 5
 """Torque enable, and the marker that a restart clears, are read with every fifth reading of a servo: their addresses are far
 off."""
@@ -71,6 +73,7 @@ class Rig:
         self._open: set[str] = set()
         self._unanswered: Counter[str] = Counter()
         self._unsure: set[str] = set()
+        self._limp_joints: set[str] = set()
         self.repaired, self.missed = 0, 0
         self._asked_since = self._heard_since = False
         self.readings: Counter[str] = Counter()
@@ -101,7 +104,7 @@ class Rig:
         Speed 0, at once, is never sent: a joint that was told this goal before keeps the speed at which it goes there, any other
         gets the slow one. A joint whose servo may have restarted gets none, as a goal might switch its torque on, at full force,
         until its registers show that it has not."""
-        unsure = {joint for joint in self._unsure if not self._mute(joint)}
+        unsure = {joint for joint in self._unsure if joint in self._limp_joints or not self._mute(joint)}
         self.missed += len((self._open | unsure) & goals.keys())
         self._open -= goals.keys()
         if self._asked_since and not self._heard_since:  # nobody answered in the whole pose, so that nobody knows of its goals
@@ -264,15 +267,15 @@ class Rig:
 
     def _miss(self, joint: str) -> None:
         self._unanswered[joint] += 1
-        if self._unanswered[joint] >= self.watch.options.confirm:
+        since = self.bus.now() - self.watch.heard(self.ids[joint])
+        if self._unanswered[joint] >= self.watch.options.confirm and since >= STARTS:
             self._unsure.add(joint)
 
     def _mute(self, joint: str) -> bool:
-        """Whether it has been silent for longer than a start takes, or answers badly: it may hear all the same."""
-        if self.ids[joint] == self.watch.doubted:
-            return True
+        """Whether it does not answer though it is doubted, or for longer than a start takes: it may hear all the same."""
         since = self.bus.now() - self.watch.heard(self.ids[joint])
-        return self._unanswered[joint] > 0 and since >= self.watch.options.silent
+        doubted = self.ids[joint] == self.watch.doubted
+        return self._unanswered[joint] > 0 and (doubted or since >= self.watch.options.silent)
 
     def _runs(self, values: Mapping[str, int]) -> bool:
         """Whether its registers show torque, and that it has not restarted."""
@@ -286,7 +289,8 @@ class Rig:
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
         self._unanswered[joint] = 0
         if "torque_enable" in values:
-            (self._unsure.discard if self._runs(values) else self._unsure.add)(joint)
+            for joints in (self._unsure, self._limp_joints):
+                (joints.discard if self._runs(values) else joints.add)(joint)
         if "present_position" not in values:
             return
         angle = self.servos[joint].angle(values["present_position"])
