@@ -40,7 +40,9 @@ def tied_in_short(tie: GravityOverTorque) -> str:
 def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
     """Gravity over torque, and each effect that would explain it alone."""
     rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
-    return Section("What angles do not tell apart", [*(Text(t.in_words()) for t in ties), *folded_table(
+    several = any(len(t.competitive) + t.may_be_torque > 1 for t in ties)
+    title = "What angles do not tell apart" if several else "Gravity over torque"
+    return Section(title, [*(Text(t.in_words()) for t in ties), *folded_table(
         ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
 
 
