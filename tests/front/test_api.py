@@ -89,7 +89,7 @@ def test_a_comparison_saves_and_shows_itself(session: workbench.Session, tmp_pat
     (lambda: workbench.OptimizeOptions(n_jobs=0), "n_jobs: expected a whole number of at least 1, got 0"),
     (lambda: Budget(population=1), "population: expected a whole number of at least 2, got 1"),
     (lambda: Budget(draws=1.5), "draws: expected a whole number of at least 0, got 1.5"),
-    (lambda: Budget(seeds="many"), "seeds: expected a whole number of at least 1, got 'many'"),
+    (lambda: Budget(seeds="many"), "seeds: expected a whole number of at least 0, got 'many'"),
     (lambda: Budget(width=math.nan), "width: expected a positive number, got nan"),
     (lambda: CertifyOptions(seconds=0.0), "seconds: expected a positive number, got 0.0"),
     (lambda: CertifyOptions(variants=("3 ms",)), "variants: expected one of 2 ms, 1 ms, .*, got '3 ms'"),

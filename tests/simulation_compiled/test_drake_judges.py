@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 import workbench.simulation.compiled
@@ -11,8 +9,8 @@ from tests.gap_sessions import record_arm
 from workbench.compare.session import load_session
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.rollouts import key as rollout_key
+from workbench.identify.rollouts.captured import channels_stream
 from workbench.simulation import Simulation, SimulationConfig
-from workbench.simulation.compiled import run_compiled
 from workbench.view.report.diagnosis import diagnosis_report
 
 
@@ -29,12 +27,11 @@ def test_a_diagnosis_says_which_engine_it_stands_on(session, tmp_path, monkeypat
     assert engine["nominal model apart from Drake [sigma]"] < 1e-3
     assert engine["final model apart from Drake [sigma]"] < 1e-3
 
-    def no_more(jobs, n_jobs):
-        if jobs:
-            raise AssertionError("a rollout that was remembered")
-        return []
+    def no_more(rollouts, n_jobs):
+        assert not rollouts, "a rollout that was remembered"
+        return iter(())
 
-    monkeypatch.setattr("workbench.identify.rollouts.evaluator.simulate_stream", no_more)
+    monkeypatch.setattr("workbench.identify.rollouts.evaluator.channels_stream", no_more)
     again = diagnose_session(session, n_jobs=1, memory=tmp_path).diagnosis
     assert again.verdict == told.verdict
     monkeypatch.setattr(rollout_key, "rollout_code", lambda: "another version")
@@ -43,11 +40,11 @@ def test_a_diagnosis_says_which_engine_it_stands_on(session, tmp_path, monkeypat
 
 
 def test_where_engines_part_a_diagnosis_is_drakes(session, monkeypatch):
-    def wrong(job):
-        take = run_compiled(job)
-        return replace(take, q=take.q * 1.01)
+    def wrong(rollouts, n_jobs):
+        for rollout, channels in zip(rollouts, channels_stream(rollouts, n_jobs)):
+            yield channels if rollout.job.config.engine == "drake" else channels * 1.01
 
-    monkeypatch.setattr(workbench.simulation.compiled, "run_compiled", wrong)
+    monkeypatch.setattr("workbench.identify.rollouts.evaluator.channels_stream", wrong)
     result = diagnose_session(session, n_jobs=1)
     engine = result.diagnosis.provenance["engine"]
     assert engine["rollouts by"] == "Drake"

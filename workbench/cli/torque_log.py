@@ -6,9 +6,12 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.files.errors import InputError
-from workbench.robot import RobotModel
+
+if TYPE_CHECKING:
+    from workbench.robot import RobotModel
 
 
 def torque_logs(files: Sequence[str | None]) -> bool:

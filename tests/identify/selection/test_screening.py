@@ -14,12 +14,12 @@ from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, l
 from workbench.identify.fitting.responses import linearised_estimate, scan
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.captured import channels_stream
 from workbench.identify.selection.candidate_fit import Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.identify.selection.scheduling import well_on_fixed_base
 from workbench.identify.selection.screening import CandidateEvaluation
 from workbench.robot import EffectSpec
-from workbench.simulation.batch import simulate_stream
 
 
 class Walking(RolloutEvaluator):
@@ -150,11 +150,11 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
 def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypatch):
     session, evidence = quiet
 
-    def killed(jobs, n_jobs):
-        yield next(iter(simulate_stream(jobs, n_jobs)))
+    def killed(rollouts, n_jobs):
+        yield next(channels_stream(rollouts, n_jobs))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("workbench.identify.rollouts.evaluator.simulate_stream", killed)
+    monkeypatch.setattr("workbench.identify.rollouts.evaluator.channels_stream", killed)
     with pytest.raises(KeyboardInterrupt):
         RolloutEvaluator(evidence, CONFIG, 1, tmp_path).residuals(
             [RolloutRequest(session.model, (0,)), RolloutRequest(session.model, (0,), until=1.5)]

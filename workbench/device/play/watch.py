@@ -65,7 +65,7 @@ class Watch:
         self._seen: Counter[tuple[int, str]] = Counter()
         self._failed: Counter[int] = Counter()
         self._answered: dict[int, float] = {}
-        self._questions: defaultdict[int, deque[tuple[float, bool]]] = defaultdict(deque)
+        self._questions: defaultdict[int, deque[tuple[float, bool, bool]]] = defaultdict(deque)
         self._only_release = False
         self.doubted: int | None = None
         self.reaction: Reaction | None = None
@@ -95,7 +95,7 @@ class Watch:
         if since >= self.options.silent:
             self._react("neutral", servo, HELD_UP.format(since))
         self._answered[servo] = time
-        self._count(servo, time, True)
+        self._count(servo, time, True, True)
         low = self._profile.supply[0]
         volts = values["present_voltage"] / 10 if "present_voltage" in values else None
         heat, limit = values.get("present_temperature"), self._limits.get(servo, 70)
@@ -123,24 +123,27 @@ class Watch:
         """It was asked and did not answer, or not so that it could be read, at a time [s]."""
         self._answered.setdefault(servo, time)
         self._failed[servo] += 1
-        self._count(servo, time, False)
+        self._count(servo, time, False, False)
         self.check(time)
 
     def impossible(self, servo: int, time: float) -> None:
         """An answer that cannot be true counts as none, but the servo has been heard."""
-        self._count(servo, time, False)
+        self._count(servo, time, False, True)
 
-    def _count(self, servo: int, time: float, answered: bool) -> None:
-        """Of its latest questions, whether too many had no answer; one that has fallen silent for good is left to `check`."""
+    def _count(self, servo: int, time: float, good: bool, heard: bool) -> None:
+        """Of its latest questions, whether too many had no good answer; one that has fallen silent for good is left to `check`,
+        and so is a single gap, as a restart or a stall leaves."""
         options, latest = self.options, self._questions[servo]
-        latest.append((time, answered))
+        latest.append((time, good, heard))
         while latest[0][0] <= time - options.silent:
             latest.popleft()
-        outcomes = [good for _, good in latest]
-        failures = outcomes.count(False)
-        if failures < options.failures or failures < options.share * len(outcomes) or not any(outcomes[outcomes.index(False):]):
+        failed = [k for k, (_, good, _) in enumerate(latest) if not good]
+        if len(failed) < options.failures or len(failed) < options.share * len(latest):
             return
-        self._doubt(servo, UNSTEADY.format(len(outcomes) - failures, len(outcomes), options.silent))
+        since = list(latest)[failed[0]:]
+        heard_between = any(heard for _, _, heard in since[:failed[-1] - failed[0] + 1])
+        if heard_between and any(good for _, good, _ in since):
+            self._doubt(servo, UNSTEADY.format(len(latest) - len(failed), len(latest), options.silent))
 
     def check(self, time: float) -> None:
         """Whether every servo was heard not too long before a time [s]: silent where it was asked, unread where it was not."""

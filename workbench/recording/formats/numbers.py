@@ -107,7 +107,7 @@ def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: i
 
 def _why_width(row: list[str], width: int, last: bool) -> str:
     """The likely cause of a row that is not as wide as the header, and the remedy."""
-    if len(row) == 1:
+    if len(row) == 1 and number_of(row[0]) is None:
         return f" ('{row[0][:40]}': text among the rows; delete the line)"
     if len(row) == width + 1 and not row[-1]:
         return " (a comma at the end of the row: delete it)"
