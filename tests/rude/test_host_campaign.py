@@ -23,6 +23,7 @@ FOUND = [
     ("STS3215", "twin", 358, 16),
     ("STS3215", "twin", 371, 17),
     ("AX-12A", "brown-out", 117, 817),
+    ("AX-12A", "stall", 185, 226),
     ("AX-12A", "twin", 255, 176),
     ("AX-12A", "brown-out", 300, 3),
     ("XL-330", "garbled command", 7, 3),
@@ -33,7 +34,8 @@ FOUND = [
 lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
 program's questions in the log; torque that stayed on where a start failed; two servos of one ID that were taken for one as
 long as an answer could be read now and then, and whose positions were mixed in the log; servos that restarted and got torque,
-at full force, from the next pose; torque limits and speeds that did not arrive before torque came on."""
+at full force, from the next pose; a stall in the first pose, after which all others
+came too early; torque limits and speeds that did not arrive before torque came on."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

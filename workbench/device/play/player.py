@@ -12,7 +12,7 @@ from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.options import Played, PlayOptions
-from workbench.device.play.rig import Rig
+from workbench.device.play.rig import DEAREST, Rig
 from workbench.device.play.watch import Reaction, StopError, Watch, WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -204,7 +204,8 @@ class _Performance:
             self.goals |= goals
             self.poses += 1
             if not k:
-                self.started, packet = sent, sent - begun
+                stalled = sent - begun > DEAREST  # it left before or after; the poses that follow count from now
+                self.started, packet = sent, 0.0 if stalled else sent - begun
             self.overtaken += ends[k] - (sent - self.started) < HELD * (ends[k] - time)
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
