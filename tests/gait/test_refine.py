@@ -11,7 +11,7 @@ from workbench.gait.evaluate import Evaluator
 from workbench.gait.limits import Margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
-from workbench.gait.refine import FALLEN, RefineOptions, _Goal, gauss_newton, refined
+from workbench.gait.refine import FALLEN, Goal, RefineOptions, gauss_newton, refined
 from workbench.gait.request import Request
 from workbench.gait.search import Found
 from workbench.gait.shape import GaitShape
@@ -99,7 +99,7 @@ def goal_of(evaluator, nominal, draws, **options):
               for k in range(len(draws))]
     canned = Canned(evaluator.machine, evaluator.request, robots, n_jobs=1)
     canned.results = (nominal, *draws)
-    return _Goal.of(canned, SHAPE, RefineOptions(**options)), robots
+    return Goal.of(canned, SHAPE, RefineOptions(**options)), robots
 
 
 def used(m, line, joint=3):

@@ -98,7 +98,7 @@ def gauss_newton(evaluator: Evaluator, shape: GaitShape, options: RefineOptions,
     step makes them so."""
     basis = _Basis.of(evaluator.machine, shape, options.harmonics)
     for iteration in range(options.iterations):
-        goal = _Goal.of(evaluator, shape, options)
+        goal = Goal.of(evaluator, shape, options)
         counted = f"{basis.size} numbers on {len(goal.robots)} robots"
         progress(f"refining: step {iteration + 1} of {options.iterations}, {counted}", None)
         zero = np.zeros(basis.size)
@@ -116,7 +116,7 @@ def gauss_newton(evaluator: Evaluator, shape: GaitShape, options: RefineOptions,
 
 
 @dataclass(frozen=True, eq=False)
-class _Goal:
+class Goal:
     """What is to be made small from a shape on: residuals of the nominal robot and of a few others, which stand for all.
 
     robots: the nominal one first. speed: the nominal robot's at the shape [m/s]. limits: by name, of the others. Nine of ten
@@ -127,10 +127,10 @@ class _Goal:
     options: RefineOptions
     robots: tuple[RobotModel, ...]
     speed: float
-    limits: Mapping[str, _OverDraws]
+    limits: Mapping[str, OverDraws]
 
     @staticmethod
-    def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> _Goal:
+    def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> Goal:
         """At a shape, from its runs on all of the evaluator's robots."""
         request, few = evaluator.request, options.robots
         nominal, *draws = evaluator.measured([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
@@ -141,8 +141,8 @@ class _Goal:
         for m in draw_margins(evaluator.machine, request, draws):
             name = m.name.removesuffix(OVER_DRAWS)
             each = [use.get(name, 0.0) for use in uses]
-            limits[name] = _OverDraws(m.use - max(each[:few], default=m.use), max(float(np.std(each)), ALIKE))
-        return _Goal(evaluator, options, (evaluator.nominal, *(evaluator.draws[k] for k in order[:few])),
+            limits[name] = OverDraws(m.use - max(each[:few], default=m.use), max(float(np.std(each)), ALIKE))
+        return Goal(evaluator, options, (evaluator.nominal, *(evaluator.draws[k] for k in order[:few])),
                      max(request.progress(nominal), SLOWEST), limits)
 
     def residuals(self, shapes: Sequence[GaitShape]) -> list[Array]:
@@ -160,14 +160,14 @@ class _Goal:
             return np.concatenate([[FALLEN, FALLEN], np.zeros(len(uses))])
         reached = [o.speed * (o.target - max(request.progress(m), SLOWEST) / self.speed),
                    o.heading * float(np.clip(drift(request, m), -1.5, 1.5))]
-        own = _OverDraws(0.0, REPRODUCED)
+        own = OverDraws(0.0, REPRODUCED)
         beyond = [(use + limit.shift - 1) / limit.scatter + o.headroom
                   for (name, _), use in uses.items() for limit in [own if nominal else self.limits.get(name, own)]]
         return np.concatenate([reached, o.limit * np.maximum(beyond, 0.0)])
 
 
 @dataclass(frozen=True)
-class _OverDraws:
+class OverDraws:
     """Use of a limit over robots. shift: that which nine of ten keep to, beyond the largest of a few. scatter: standard
     deviation."""
 
