@@ -72,7 +72,7 @@ def test_variation_between_days_is_not_reported():
 
 def test_a_known_weight_in_some_takes_leaves_torque_as_the_only_cause():
     here, fit, fits = found(math.log(0.6), 0.5, loaded=0.5)
-    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
+    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits, weighed=True)
     assert tied.torque_behind == 0.0
     assert min(n.behind for n in tied.names) > OPTIONS.occam
     assert tied.competitive == ()

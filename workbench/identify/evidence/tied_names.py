@@ -121,10 +121,10 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
     return [replace(n, sd=min(n.sd, drift.of(n.name))) if n.name in TORQUES else n for n in numbers]
 
 
-def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None
-                        ) -> GravityOverTorque | None:
+def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None,
+                        weighed: bool = False) -> GravityOverTorque | None:
     """The tie as it is reported; None where nothing of it has changed, or where an effect that could look like one of its effects
-    (`Effect.resembles`) is told from all of them. fits: of `fits_of_tie`."""
+    (`Effect.resembles`) is told from all of them. fits: of `fits_of_tie`; weighed: as the result has it."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or fits is None or not fits.names:
         return None
@@ -143,4 +143,4 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
     share = min((t.share for t in ties if t is not None), default=1.0)
     there = sum(w for f, w in p.weights if any(competes(c) for c in f.hypothesis.effects))
     return GravityOverTorque(region.joints, ratio.estimate(options), min(1.0, CONCLUSIONS.surest * share * there),
-                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque))
+                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque), weighed)
