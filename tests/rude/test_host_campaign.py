@@ -33,6 +33,7 @@ FOUND = [
     ("AX-12A", "twin", 260, 219),
     ("STS3215", "twin", 338, 651),
     ("STS3215", "twin", 218, 685),
+    ("AX-12A", "cable", 120, 196),
     ("AX-12A", "deaf port", 173, 474),
     ("XL-330", "brown-out", 285, 174),
     ("XL-330", "twin", 271, 883),
@@ -43,8 +44,8 @@ program's questions in the log; torque that stayed on where a start failed; two 
 long as an answer could be read now and then, and whose positions were mixed in the log; servos that restarted and got torque,
 at full force, from the next pose; a stall in the first pose, after which all others came too early; torque limits and speeds that
 did not arrive before torque came on; a servo of two with one ID that still answered when the next was asked, so that that one
-held its goal in the ramp to neutral. The last three were the campaign's own: it took the first goal in the log for the first
-pose, which had been withheld."""
+held its goal in the ramp to neutral; positions in the log of a servo that nobody heard any more. The last three were the
+campaign's own: it took the first goal in the log for the first pose, which had been withheld."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

@@ -199,8 +199,7 @@ def _virtual(args: argparse.Namespace, robot: RobotModel) -> VirtualRobot | None
 @contextmanager
 def _cameras(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None, folder: Path) -> Iterator[PoseSource]:
     """The emulated robot's, or Motive's, whose whole recording is kept in `folder`."""
-    from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.capture.background import BackgroundRecording
+    from workbench.device.capture import BackgroundRecording, Recorder, UdpLink
     from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
     from workbench.gait.drive.walk import Cameras
 
