@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
     if certified:
-        options = replace(options, most=certified.most, most_change=certified.most_change)
+        options = replace(options, **certified.limits)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fit_map(args, family, progress)
