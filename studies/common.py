@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,13 +18,14 @@ from scipy.spatial.transform import Rotation
 
 from workbench.cli.progress import Progress
 from workbench.files import InputError
-from workbench.files.reading import write_together
+from workbench.files.reading import read_text, write_together, write_whole
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.types import Array
 from workbench.view.figures.style import in_house_style
 from workbench.view.report.page import Report
 
+T = TypeVar("T")
 ROOT = Path(__file__).resolve().parents[1]
 
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
@@ -51,6 +53,15 @@ def body_track(take: Take, times: Array) -> Array:
     R = _TO_THESIS @ Rotation.from_quat(seen.quat_WB, scalar_first=True).as_matrix() @ _TO_THESIS.T
     heading, pitch, roll = np.degrees(np.unwrap(Rotation.from_matrix(R).as_euler("YZX"), axis=0)).T
     return np.column_stack([p, roll, heading - heading[0], pitch])[1:]
+
+
+def kept_result(path: Path, make: Callable[[], T]) -> T:
+    """The content of a JSON file, computed and written at the first call, so that an interrupted study resumes."""
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, json.dumps(make(), indent=1) + "\n")
+    result: T = json.loads(read_text(path))
+    return result
 
 
 def body_end(take: Take, seconds: float) -> Array:

@@ -216,8 +216,8 @@ def test_what_fixed_base_takes_identified_keeps_its_numbers_beside_what_is_fitte
     assert alone.x == pytest.approx(search.settled.x)
 
 
-@pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes do not mind", "they speak against it"])
-def test_most_from_floating_when_commands_come_unless_fixed_base_takes_speak_against_it(left, late):
+@pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes allow it", "held takes contradict it"])
+def test_most_from_floating_when_commands_come_unless_fixed_base_takes_contradict_it(left, late):
     delay = Candidate.of(known_effects()["command_delay"], ("three",), (0.0,))
 
     def fit(x, held):

@@ -1,4 +1,4 @@
-"""What no search finds and the recordings show: stops, missed poses, turned marker frames, loose mounts."""
+"""Effects read directly from the recordings: stops, missed poses, turned marker frames, loose mounts."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""How a servo log was logged, told by the log alone: a sensor refreshed more slowly than it is read, and a register of duty."""
+"""Logging conditions identified from the log alone: a sensor refreshed more slowly than it is read, and a duty register."""
 
 from __future__ import annotations
 

@@ -11,8 +11,7 @@ from workbench.compare.options import COMPARE
 from workbench.compare.session_file import write_session
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import family_of, survey
-from workbench.device.capture import Capture, Recorder, record_take
-from workbench.device.capture.background import BackgroundRecording
+from workbench.device.capture import BackgroundRecording, Capture, Recorder, record_take
 from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
 from workbench.device.tables.table_file import table_file

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
     if certified:
-        options = replace(options, most=certified.most, most_change=certified.most_change)
+        options = replace(options, **certified.limits)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fit_map(args, family, progress)
@@ -199,8 +199,7 @@ def _virtual(args: argparse.Namespace, robot: RobotModel) -> VirtualRobot | None
 @contextmanager
 def _cameras(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None, folder: Path) -> Iterator[PoseSource]:
     """The emulated robot's, or Motive's, whose whole recording is kept in `folder`."""
-    from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.capture.background import BackgroundRecording
+    from workbench.device.capture import BackgroundRecording, Recorder, UdpLink
     from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
     from workbench.gait.drive.walk import Cameras
 

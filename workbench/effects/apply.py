@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.cache import Cache
 from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
 from workbench.effects.schedules import delay_commands
@@ -107,25 +106,24 @@ def physics_of(model: RobotModel) -> Physics:
                    tuple(terms), retimed)
 
 
-_builds: OrderedDict[Any, SdfRobot] = OrderedDict()
+_builds: Cache[SdfRobot] = Cache(KEPT_BUILDS)
 
 
 def _apply_to_sdf(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
     """The model's SDF with these effects on its description; the same object for the same ones, as most robots of a search differ
     in their servos alone. Another package's effect may look at all of the model, so that nothing is shared with it."""
     own = all(type(effect).__module__.startswith(f"{__package__}.") for effect, _ in changes)
+
+    def build() -> SdfRobot:
+        sdf = SdfRobot(model.path)
+        for effect, spec in changes:
+            effect.description(sdf, spec, model)
+        return sdf
+
+    if not own:
+        return build()
     said = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
-    key = (model.path, model.path.stat().st_mtime_ns, said)
-    if own and (known := _builds.get(key)) is not None:
-        return known
-    sdf = SdfRobot(model.path)
-    for effect, spec in changes:
-        effect.description(sdf, spec, model)
-    if own:
-        _builds[key] = sdf
-        while len(_builds) > KEPT_BUILDS:
-            _builds.popitem(last=False)
-    return sdf
+    return _builds.get((model.path, model.path.stat().st_mtime_ns, said), build)
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:

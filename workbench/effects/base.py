@@ -128,6 +128,9 @@ class Effect:
     """Effects at the same joint or link that are special cases of it, and so are never added to it."""
     tied: ClassVar[Tie | None] = None
     """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
+    resembles: ClassVar[Tie | None] = None
+    """A tie of which it is no member, as a joint may have both, but whose effects it can look like: where one of them, or it, is
+    found, all are compared."""
     steady_pull: ClassVar[bool] = False
     """Whether it is a steady force on the robot: of several such effects all but one only compensate for the imperfect fit of
     that one."""

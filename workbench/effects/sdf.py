@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from workbench.cache import Cache
 from workbench.effects.sdf_values import format_numbers, numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose
 from workbench.files import InputError
 from workbench.robot import JointFrame, Kinematics
@@ -31,7 +31,7 @@ DRAKE = "{http://drake.mit.edu}"
 
 KEPT = 64
 """Number of kinematic trees that are kept."""
-_kinematics: OrderedDict[tuple[object, ...], Kinematics] = OrderedDict()
+_kinematics: Cache[Kinematics] = Cache(KEPT)
 
 
 class SdfRobot:
@@ -64,13 +64,7 @@ class SdfRobot:
 
     def kinematics(self) -> Kinematics:
         """Of the robot as it is now, but for its masses; parsed once for the same changes of joints and lengths."""
-        key = tuple(self._built)
-        known = _kinematics.get(key)
-        if known is None:  # rollouts are made in threads, and another may drop what this one keeps
-            known = _kinematics[key] = Kinematics.from_text(self.text(), self.path)
-            while len(_kinematics) > KEPT:
-                _kinematics.popitem(last=False)
-        return known
+        return _kinematics.get(tuple(self._built), lambda: Kinematics.from_text(self.text(), self.path))
 
     def add_play(self, joint: str, gap: float) -> None:
         """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""

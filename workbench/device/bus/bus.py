@@ -11,10 +11,9 @@ from typing import Any, Literal, TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
 
-from workbench.device.bus import group
+from workbench.device.bus import group, wire
 from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
 from workbench.device.bus.ports import GONE, StripEcho, port_gone
-from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, parameters_of, ping, read_packet
 from workbench.robot.servo_profile import Register, ServoProfile
 
 T = TypeVar("T")
@@ -52,8 +51,8 @@ class Bus:
         self.group_kind: group.Kind | Literal[""] = profile.group_read
         if strip_echo:
             self.port = StripEcho(port)
-        elif self._release_after(lambda: hears_itself(port, profile.protocol)):
-            raise echo_error()
+        elif self._release_after(lambda: wire.hears_itself(port, profile.protocol)):
+            raise wire.echo_error()
 
     # Time
 
@@ -80,14 +79,13 @@ class Bus:
         """Registers by name, in one packet from the first to the last of them; asked again where the answer is missing or broken.
 
         NoAnswerError after `tries`, BusError where the servo refuses."""
-        wanted = [self._register(name) for name in names]
-        first = min(r.address for r in wanted)
-        count = max(r.address + r.size for r in wanted) - first
+        wanted, first, count = self._block(names)
 
         def call() -> tuple[bytes, int, int]:
             self.asked = self.now() + (8 if self.profile.protocol == 1 else 14) * self.port.tx_time_per_byte / 1000
-            answer, result, error = self._handler.txRxPacket(self.port, read_packet(self.profile.protocol, servo, first, count))
-            return parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
+            question = wire.read_packet(self.profile.protocol, servo, first, count)
+            answer, result, error = self._handler.txRxPacket(self.port, question)
+            return wire.parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
 
         data = self._ask(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
@@ -139,29 +137,17 @@ class Bus:
         kind = self.group_kind
         if not kind:
             raise ValueError(f"{self.profile.name} cannot be asked all at once")
-        wanted = [self._register(name) for name in names]
-        first = min(r.address for r in wanted)
-        count = max(r.address + r.size for r in wanted) - first
+        wanted, first, count = self._block(names)
         packet = group.question(kind, servos, first, count)
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
-        heard = self._release_after(lambda: self._collect(packet, group.reply_length(kind, len(servos), count)))
+        heard = self._release_after(lambda: wire.collect(self.port, packet, group.reply_length(kind, len(servos), count)))
         out = {}
         for servo, (error, data) in group.answers(kind, heard, count, servos).items():
             self._look(servo, error)
             out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        if heard and len(out) < len(servos):
+            self._release_after(lambda: wire.wait_for_silence(self.port))
         return out
-
-    def _collect(self, packet: bytes, most: int) -> bytes:
-        """Sends and listens until so many bytes are there, or none came for as long as the port has patience."""
-        port = self.port
-        port.clearPort()
-        port.writePort(list(packet))
-        heard, last = bytearray(), port.getCurrentTime() + len(packet) * port.tx_time_per_byte
-        while len(heard) < most and port.getCurrentTime() < last + port.patience + 70 * port.tx_time_per_byte:
-            got = bytes(port.readPort(most - len(heard)))
-            if got:
-                heard, last = heard + got, port.getCurrentTime()
-        return bytes(heard)
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
         """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when its
@@ -228,11 +214,11 @@ class Bus:
         """How many servos seem to answer to one ID, of five pings: 2 where answers are longer than one, or broken, again and
         again."""
         protocol = self.profile.protocol
-        packet, most = ping(protocol, servo), 24 if protocol == 1 else 56
-        heard = [self._release_after(lambda: hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
+        packet, most = wire.ping(protocol, servo), 24 if protocol == 1 else 56
+        heard = [self._release_after(lambda: wire.hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
         if not any(heard):
             return 0
-        return 2 if sum(bool(answer) and not clean(protocol, answer) for answer in heard) >= 3 else 1
+        return 2 if sum(bool(answer) and not wire.clean(protocol, answer) for answer in heard) >= 3 else 1
 
     # Inside
 
@@ -240,6 +226,12 @@ class Bus:
         if name not in self.profile.registers:
             raise BusError(f"{self.profile.name} has no such register", register=name)
         return self.profile.registers[name]
+
+    def _block(self, names: Sequence[str]) -> tuple[list[Register], int, int]:
+        """Registers, and address and length of the shortest piece of the table that holds them."""
+        wanted = [self._register(name) for name in names]
+        first = min(r.address for r in wanted)
+        return wanted, first, max(r.address + r.size for r in wanted) - first
 
     def _write(self, servo: int, name: str, value: int) -> None:
         register = self._register(name)
@@ -264,6 +256,8 @@ class Bus:
                 if refused:
                     raise BusError(f"refused: {refused}", servo, joint, register)
                 return data
+            if result in (COMM_RX_CORRUPT, COMM_SUCCESS):
+                self._release_after(lambda: wire.wait_for_silence(self.port))
         how = "only broken answers" if result in (COMM_RX_CORRUPT, COMM_SUCCESS) else "no answer"
         raise NoAnswerError(f"{how} in {self.options.tries} tries", servo, joint, register)
 

@@ -3,13 +3,13 @@ take, and outside Python's lock. Rollouts that the compiled station does not cov
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
 
+from workbench.cache import Cache
 from workbench.compare.channels import ACROSS, BODY, body_channels, joint_of
 from workbench.effects.apply import apply_to_measurement
 from workbench.identify.problem import TakeEvidence
@@ -18,7 +18,7 @@ from workbench.recording.mocap.observe import frame_turn
 from workbench.recording.mocap.tracks import SeenJoint, seen_joints, turn_quaternion
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
-from workbench.robot import Kinematics, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation.batch import run_job, simulate_stream
 from workbench.simulation.cluster import on_cluster
 from workbench.simulation.compiled import NotCoveredError
@@ -120,20 +120,14 @@ def _play_compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
     return out
 
 
-_joints: OrderedDict[object, tuple[Kinematics, list[SeenJoint]]] = OrderedDict()
+_joints: Cache[list[SeenJoint]] = Cache(32)  # robots and sets of tracked bodies
 
 
-def _looked_at(e: TakeEvidence, model: RobotModel, kept: int = 32) -> list[SeenJoint]:
-    """Joints between bodies that cameras track; found once for the same robot and bodies, whatever its effects. kept: robots and
-    sets of tracked bodies whose joints are remembered."""
-    kinematics, assets = model.kinematics, tuple(e.take.measurement.pivots)
-    key = (id(kinematics), tuple(model.rigid_bodies.items()), model.base, assets, e.take.spec.base)
-    found = _joints.get(key)
-    if found is None:  # with the kinematics, so that its id stays its own
-        found = _joints[key] = (kinematics, seen_joints(assets, model, e.take.spec.base)[0])
-        while len(_joints) > kept:
-            _joints.popitem(last=False)
-    return found[1]
+def _looked_at(e: TakeEvidence, model: RobotModel) -> list[SeenJoint]:
+    """Joints between bodies that cameras track; found once for the same robot and bodies, whatever its effects."""
+    kinematics, assets, base = model.kinematics, tuple(e.take.measurement.pivots), e.take.spec.base
+    key = (id(kinematics), tuple(model.rigid_bodies.items()), model.base, assets, base)
+    return _joints.get(key, lambda: seen_joints(assets, model, base)[0], held=kinematics)
 
 
 def _body(e: TakeEvidence, model: RobotModel, m: Measurement, bodies: SeenBodies, assets: list[str], frame: Array) -> Array:

@@ -15,7 +15,7 @@ from workbench.types import Array
 @dataclass(frozen=True)
 class ShiftChecks:
     """least: smallest step between two rows, relative to its neighbours [deg], and `times` the difference of other steps from
-    theirs in the `near` rows on each side. beyond: or so many times 99 % of the log's steps. alike: largest difference, as a
+    theirs in the `near` rows on each side. beyond: or so many times 99 % of the log's steps. agreement: largest difference, as a
     share of the step, between the level of the readings and that of the goals. goal: a goal that steps by that share of it
     within `before` explains it [s]. rows: fewest in a stretch. slowest: rows further apart are not used [s]. pause: steps across
     or next to rows that are so many medians apart are not used. explained: share of the position's variance that the goals must
@@ -117,5 +117,4 @@ def _line(log: JointLog, off: Array, edges: list[int]) -> str:
     else:
         where = f"in {len(shifted)} stretches, the first from {log.time[a]:.3f} s (row {log.rows[a] + 1})"
     return (f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or homing "
-            f"offset, a "
-            "slipped horn or sensor); set right by that much")
+            "offset, a slipped horn or sensor); set right by that much")

@@ -121,7 +121,8 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
     numbers = [(f"gravity over torque at {join_words(t.where)}", f"{t.ratio.value:.2f}×",
-                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}") for t in diagnosis.tied]
+                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}"
+                + (", alone or together" if t.may_be_several else "")) for t in diagnosis.tied]
     for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (

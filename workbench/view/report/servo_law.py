@@ -33,14 +33,15 @@ def tied_in_short(tie: GravityOverTorque) -> str:
     if tie.may_be_torque:
         causes.append("other torques of the servo")
     if len(causes) == 1:
-        return f"{tie.change} Cause: {causes[0]}."
+        more = ", alone or together with a change of what it carries, which angles do not tell" if tie.may_be_several else ""
+        return f"{tie.change} Cause: {causes[0]}{more}."
     return f"{tie.change} Angles alone do not tell the cause: {join_words(causes, 'or')}."
 
 
 def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
     """Gravity over torque, and each effect that would explain it alone."""
     rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
-    several = any(len(t.competitive) + t.may_be_torque > 1 for t in ties)
+    several = any(len(t.competitive) + t.may_be_torque > 1 or t.may_be_several for t in ties)
     title = "What angles do not tell apart" if several else "Gravity over torque"
     return Section(title, [*(Text(t.in_words()) for t in ties), *folded_table(
         ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
