@@ -1,4 +1,4 @@
-"""A motion on the robot, from the preflight to a session that can be compared and diagnosed."""
+"""Runs a motion on the robot, from the preflight checks to a session that can be compared and diagnosed."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
                  options: PlayOptions | None = None, seed: int = 0, progress: Progress | None = None) -> RobotRun:
     """Checks all servos, plays the motion while the cameras record, and writes takes, registers, motion and session.
 
-    virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError
-    where something has to be fixed first; nothing was moved then.
+    virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError if
+    something has to be fixed first; then nothing has moved.
     """
     tell = progress or (lambda what, done: None)
     found = survey(bus, model, ids=(), progress=tell)
