@@ -260,7 +260,7 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeRep
     quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
     assert "The recordings do not differ from the nominal model by more than chance." in page
-    assert "Afterwards all is within" in page
+    assert "everything is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
 

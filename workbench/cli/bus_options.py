@@ -47,7 +47,7 @@ def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | 
 
 @contextmanager
 def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> Iterator[Bus]:
-    """The bus, whose port is closed at the end; BusError in one line where there is none."""
+    """The bus, whose port is closed at the end; BusError in one line if there is none."""
     from workbench.device.bus import Bus
     from workbench.device.bus.survey import family_of
     from workbench.robot import bus_ids

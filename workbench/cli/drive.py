@@ -134,7 +134,7 @@ def _load_certificate(args: argparse.Namespace, model: RobotModel) -> FamilyCert
         return read_family(args.gait, model)
     except InputError as e:
         if args.port is not None and not args.force:
-            raise InputError(e.source, f"{e.problem}; --force drives all the same") from None
+            raise InputError(e.source, f"{e.problem}; use --force to drive anyway") from None
         if (Path(args.gait).parent / FILE).is_file():
             warn("drive", [str(e)])
         return None
@@ -148,7 +148,7 @@ def _fit_map(args: argparse.Namespace, family: GaitFamily, progress: Callable[..
 
 
 def _check_port(args: argparse.Namespace, model: RobotModel) -> None:
-    """The gait's certificate, and options that do not fit together; InputError."""
+    """Checks the gait's certificate, and that the options fit together; InputError if not."""
     from workbench.cli.check import check_certificate_of
     from workbench.files import InputError
     from workbench.motion import load_motion
@@ -199,8 +199,7 @@ def _virtual(args: argparse.Namespace, robot: RobotModel) -> VirtualRobot | None
 @contextmanager
 def _cameras(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None, folder: Path) -> Iterator[PoseSource]:
     """The emulated robot's, or Motive's, whose whole recording is kept in `folder`."""
-    from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.capture.background import BackgroundRecording
+    from workbench.device.capture import BackgroundRecording, Recorder, UdpLink
     from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
     from workbench.gait.drive.walk import Cameras
 

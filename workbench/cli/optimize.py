@@ -61,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Searches, certifies, writes, and says what came of it."""
+    """Searches, certifies, writes, and prints the result."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _options(args: argparse.Namespace, model: RobotModel, request: Request) -> OptimizeOptions:
-    """Size, method and start of the search."""
+    """Size, method and starting point of the search."""
     from dataclasses import replace
 
     from workbench.files import InputError

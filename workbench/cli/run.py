@@ -1,4 +1,4 @@
-"""`workbench run MOTION`: on the robot and back, in one command."""
+"""`workbench run MOTION`: play, record and compare in one command."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plays, records, compares and says what came of it."""
+    """Plays, records, compares and prints the result."""
     from workbench.api.robot_run import run_by_controller, run_on_robot
     from workbench.cli.diagnose import diagnose_and_report
     from workbench.cli.progress import Progress

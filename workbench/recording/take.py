@@ -124,7 +124,7 @@ class Take:
             if (q[good] == q[good][0]).all():  # a base that is held
                 out[inside] = q[good][0]
             else:
-                out[inside] = quat.interpolated(self.time[good], q[good], time[inside])
+                out[inside] = quat.interpolate(self.time[good], q[good], time[inside])
             out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
             return out
 

@@ -67,7 +67,8 @@ class Explanation:
     @property
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """Gravity over torque where it is not as told, with the effects that could be it."""
-        said = (gravity_over_torque(region, self.options, p, fits)
+        weighed = len({repr(e.take.spec.load) for e in self.looked_at}) > 1
+        said = (gravity_over_torque(region, self.options, p, fits, weighed)
                 for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.of_tie))
         return tuple(s for s in said if s is not None)
 

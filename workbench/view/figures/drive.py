@@ -1,4 +1,4 @@
-"""A driven path: way-points, the way walked, and the turn of each cycle."""
+"""A driven path: way-points, the path walked, and the turn of each cycle."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from matplotlib.patches import Circle
 
 from workbench.gait.drive.loop import Driven
 from workbench.gait.drive.plan import Disc
-from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, in_house_style, legend_above, new_figure
 
 
-@styled
+@in_house_style
 def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[Disc] = ()) -> Figure:
     """Seen from above, x forward to the right, y left upwards [m]: the path, the way-points, the steered robot and, if given, the
     same robot with the straight gait; discs to walk around."""
@@ -33,7 +33,7 @@ def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[
     return figure
 
 
-@styled
+@in_house_style
 def driven_cycles(closed: Driven, most: float) -> Figure:
     """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, sideways stride
     [mm per stance], and the estimated turning bias [deg per cycle]. most: largest turn [rad per stance]."""

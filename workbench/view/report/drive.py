@@ -44,7 +44,7 @@ def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driv
     misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
     report = Report("Driven path", f"Way-points passed at {misses} cm; stopped: {closed.reason}.", CLAIM,
                     provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
-    caption = "" if straight is None else "Both robots are the same, with the same gait."
+    caption = "" if straight is None else "Both runs use the same robot and the same gait."
     report.add(Section("The path", [Picture(driven_path(closed, straight, discs), caption)]))
     cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
     report.add(Section("Cycle by cycle", [cycles, _errors(closed, straight)]))
