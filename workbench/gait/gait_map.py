@@ -135,8 +135,9 @@ class GaitMap:
 
 def load_map(path: str | Path, model: RobotModel) -> GaitMap:
     """A map that `GaitMap.save` wrote. InputError where it is none, or of another robot."""
+    text = read_text(Path(path))
     try:
-        content = json.loads(read_text(Path(path)))
+        content = json.loads(text)
         cells = [{**c, "shape": GaitShape.from_plain(c["shape"]), "fresh": tuple(c["fresh"]) if c["fresh"] else None}
                  for c in content["cells"]]
         options = {**content["options"], "knees": tuple(content["options"]["knees"])}

@@ -165,8 +165,9 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
     at = Path(gait).parent / FILE
     if not at.is_file():
         raise InputError(at, "the family's certificate is missing; `workbench drive --certify --gait MOTION` writes it")
+    text = read_text(at)
     try:
-        content = json.loads(read_text(at))
+        content = json.loads(text)
         digest, known = content.pop("sha256"), content["format"]
         good = digest == _digest(content)
     except (ValueError, KeyError, TypeError, AttributeError) as e:
