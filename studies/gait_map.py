@@ -2,8 +2,9 @@
 
     python -m studies.gait_map [--out runs/studies/gait_map] [--quick]
 
-Needs the extra [map]. The search (pyribs) keeps in each cell the gait whose motion differs least over drawn robots; each cell is
-then played on fresh ones. With a Dask cluster: `with joblib.parallel_config(backend="dask"): build_map(...)`.
+Needs the extra [map]. The search (pyribs) keeps in each cell the gait whose motion differs least over a few drawn robots; these
+gaits are measured on others, and each cell is then played on fresh ones. With a Dask cluster: `with
+joblib.parallel_config(backend="dask"): build_map(...)`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from workbench.robot import puppy_model
 from workbench.view.figures.style import in_house_style, new_figure
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table
 
-QUICK = MapOptions(generations=2, batch=6, robots=1, fresh=1, seconds=1.0)
+QUICK = MapOptions(generations=2, batch=6, robots=1, measured=1, fresh=1, seconds=1.0)
 
 
 @in_house_style

@@ -174,3 +174,10 @@ def test_options_that_do_not_fit_are_one_line(arguments: list[str], said: str, c
     assert main(["drive", "1,0", "--gait", str(GAIT), "--out", str(tmp_path / "out"), *arguments]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--seed", "--draw"])
+def test_a_seed_below_zero_is_one_line(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["drive", "1,0", "--gait", str(GAIT), option, "-1"])
+    assert f"{option}: expected a whole number of at least 0" in capsys.readouterr().err

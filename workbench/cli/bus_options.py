@@ -108,7 +108,7 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
                 port.closePort()
         return
     if args.image is None:
-        raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+        raise InputError(None, "the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
     if find_spec("unicorn") is None:
         raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     try:

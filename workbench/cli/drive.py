@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli.bus_options import VIRTUAL
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_model, add_out, load_model, positive, seed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,13 +47,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="a disc on the floor to walk around, centre and radius [m]; repeatable")
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")
-    truth.add_argument("--draw", type=int, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
+    truth.add_argument("--draw", type=seed, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
     parser.add_argument("--law", choices=("mpc", "proportional"), default="mpc", help="controller (default: mpc)")
     parser.add_argument("--lost", type=_share, default=0.0, metavar="SHARE",
                         help="share of cycles without a pose, in simulation (default: 0)")
     parser.add_argument("--blind", type=_seconds, default=1.5, metavar="SECONDS",
                         help="stop after so long without a pose (default: 1.5)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of map and cameras (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="random seed of map and cameras (default: 0)")
     parser.add_argument("--cycles", type=positive, default=100, metavar="N", help="stop after so many cycles (default: 100)")
     parser.add_argument("--view", action="store_true", help="show path, plan and robot live in the browser (Meshcat)")
     parser.add_argument("--port", metavar="PORT", help="serial port of the PC link of the robot's CM-530, with the workbench's "

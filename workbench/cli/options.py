@@ -76,6 +76,16 @@ def positive(text: str) -> int:
     return value
 
 
+def seed(text: str) -> int:
+    """A whole number of at least 0, for argparse: random generators take no other."""
+    from workbench.files.numerals import whole_of
+
+    value = whole_of(text)
+    if value is None or value < 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 0, got {text[:40]}")
+    return value
+
+
 def seconds(text: str) -> float:
     """A positive finite number, for argparse."""
     from workbench.files.numerals import number_of

@@ -1,7 +1,8 @@
 """A map of gaits over speed and turning: in each cell the gait whose motion differs least from robot to robot.
 
-A gait belongs to the cell of its median motion over the nominal robot and drawn ones, since that is what it does on a robot that
-nobody measured.
+A gait belongs to the cell of its median motion over drawn robots, since that is what it does on a robot that nobody measured. The
+search finds gaits on few of them; each cell's gait is then measured on others, because those few flatter the gaits that were
+chosen on them, and tried on fresh ones.
 
 Needs the extra [map] (pyribs). Inside `joblib.parallel_config(backend="dask")` the rollouts run on the client's cluster.
 """
@@ -44,12 +45,12 @@ CONFIG = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
 class MapOptions:
     """Size of the map and of its search.
 
-    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12
-    m/s. turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can
-    follow each other. generations, batch: of pyribs' emitter; robots: drawn ones, in addition to the nominal one, for the
-    spread. seconds: of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning
-    [m/s]. fresh: drawn robots on which each cell is tried afterwards. same: largest difference of the median there, as a share
-    of the map's range.
+    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12 m/s.
+    turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can follow
+    each other. generations, batch: of pyribs' emitter; robots: drawn ones of the search, in addition to the nominal one. seconds:
+    of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning [m/s]. measured:
+    drawn robots on which the gaits found are measured. fresh: drawn robots on which each cell is tried afterwards. same: largest
+    difference of the median there, as a share of the map's range.
     """
 
     cells: int = 7
@@ -63,18 +64,19 @@ class MapOptions:
     robots: int = 4
     seconds: float = 2.0
     spread: float = 0.1
+    measured: int = 8
     fresh: int = 8
     same: float = 0.1
 
     def __post_init__(self) -> None:
-        check_whole(self, cells=2, generations=1, batch=2, robots=1, fresh=1)
+        check_whole(self, cells=2, generations=1, batch=2, robots=1, measured=1, fresh=1)
         check_positive(self, "speed", "turning", "turn", "seconds", "spread", "same")
 
 
 @dataclass(frozen=True)
 class Cell:
-    """speed [m/s], turning [rad/s]: medians over the nominal robot and the drawn ones. spread: RMS difference of these robots
-    from them [rad/s]. fresh: median speed and turning of the fresh robots, None where one fell; reproduced: whether these are
+    """speed [m/s], turning [rad/s]: medians over the robots it was measured on. spread: RMS difference of these robots from them
+    [rad/s]. fresh: median speed and turning of the fresh robots, None where one fell; reproduced: whether these are
     within `same`."""
 
     shape: GaitShape
@@ -154,11 +156,13 @@ def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0
     """Fills the map. folder: for drawn robots' files. The same seed gives the same map, whatever `n_jobs` or the cluster is.
     InputError where pyribs is not installed."""
     search = _Search(GaitMachine(model), options or MapOptions(), n_jobs)
-    drawn = ensemble.draws(model, search.options.robots, seed, folder)
-    found = search.run([model, *drawn], seed, progress)
+    o = search.options
+    found = search.run([model, *ensemble.draws(model, o.robots, seed, folder)], seed, progress)
+    progress("measuring", None)
+    cells = search.measured(found, ensemble.draws(model, o.measured, seed + 1, folder, even=True))
     progress("fresh robots", None)
-    fresh = ensemble.draws(model, search.options.fresh, seed + 1, folder)
-    return GaitMap(search.options, search.tried(found, fresh), search.rollouts, model.sha256)
+    fresh = ensemble.draws(model, o.fresh, seed + 2, folder, even=True)
+    return GaitMap(o, search.tried(cells, fresh), search.rollouts, model.sha256)
 
 
 class _Search:
@@ -168,8 +172,8 @@ class _Search:
         space = space_of(machine, Request())
         self.space: Space = replace(space, low=_with(space, "turn", -options.turn), high=_with(space, "turn", options.turn))
 
-    def run(self, robots: Sequence[RobotModel], seed: int, progress: Progress) -> list[Cell]:
-        """Generation by generation; the nominal robot comes first."""
+    def run(self, robots: Sequence[RobotModel], seed: int, progress: Progress) -> list[GaitShape]:
+        """The gaits of all cells, generation by generation; the nominal robot comes first."""
         try:
             from ribs.archives import GridArchive
             from ribs.emitters import IsoLineEmitter
@@ -187,8 +191,26 @@ class _Search:
             inside = [(x, *j) for x, j in zip(points, judged) if j is not None]
             if inside:
                 archive.add(*(np.array(column) for column in zip(*inside)))
-        kept = archive.data(["solution", "objective", "measures"], return_type="tuple")
-        return [Cell(self.shape(x), float(m[0]), float(m[1]), float(-s)) for x, s, m in zip(*kept)]
+        return [self.shape(x) for x in archive.data("solution")]
+
+    def measured(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[Cell]:
+        """Of gaits whose motion on these robots is in the same cell, the one that differs least from robot to robot."""
+        cells: dict[tuple[int, int], Cell] = {}
+        for shape, judged in zip(shapes, self.judged(shapes, robots)):
+            if judged is not None:
+                objective, (speed, turning) = judged
+                cell = Cell(shape, speed, turning, -objective)
+                place = self.place(speed, turning)
+                if place not in cells or cell.spread < cells[place].spread:
+                    cells[place] = cell
+        return list(cells.values())
+
+    def place(self, speed: float, turning: float) -> tuple[int, int]:
+        """Row and column of the cell of a motion inside the map's range."""
+        o = self.options
+        shares = speed / o.speed, (turning + o.turning) / (2 * o.turning)
+        row, column = (min(int(o.cells * share), o.cells - 1) for share in shares)
+        return row, column
 
     def shape(self, x: Array) -> GaitShape:
         """Of a point of the unit cube."""

@@ -261,6 +261,7 @@ class _Performance:
         try:
             unknown = self.rig.release()
             self.rig.limit_torque(1)
+            self.rig.bus.pause(0.002)
         except (BusError, InputError):
             return False
         return not unknown
