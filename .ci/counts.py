@@ -1,8 +1,8 @@
-"""How well the code can be read, in numbers that may only shrink; part of `make lint`.
+"""Readability counts that may only shrink; part of `make lint`.
 
     python .ci/counts.py [--list]
 
-Each count has a limit in LIMITS, which is lowered when it falls; 1 where one is exceeded. --list names what is counted.
+Each count has a limit in LIMITS, which is lowered when it falls; exit code 1 if any is exceeded. --list prints the items counted.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ROOM = ROOT / "workbench"
 LONGEST, MOST_COMPLEX = 300, 15
 """Lines of a file, and complexity of a function, that need no exception."""
 STAYS = ("compare", "identify", "experiment")
-"""Packages whose numbers stand in their options; without identify/selection, which the search by evidence replaces."""
+"""Packages that keep their numbers in option classes, except identify/selection, which the evidence search is to replace."""
 NO_NAMES = ("cli", "compare", "experiment", "identify", "view")
 """Packages that know no effect by its name."""
 LIMITS = {
@@ -41,7 +41,7 @@ LIMITS = {
 
 @cache
 def _edges() -> dict[str, set[str]]:
-    """What each module of the workbench imports of it, names in annotations apart."""
+    """The workbench modules that each module imports, not counting imports for annotations."""
     graph = grimp.build_graph("workbench", exclude_type_checking_imports=True)
     return {m: set(graph.find_modules_directly_imported_by(m)) for m in graph.modules}
 
@@ -86,7 +86,7 @@ def constants(rooms: tuple[str, ...], skipped: str = "") -> list[str]:
 
 
 def _is_number(node: ast.expr) -> bool:
-    """A number, numbers, or what is worked out of them."""
+    """Whether a node is a number, a tuple of numbers, or arithmetic on them."""
     literals = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
     return bool(literals) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in literals)
 
@@ -140,7 +140,7 @@ COUNTS: dict[str, Callable[[], list[str]]] = dict(zip(LIMITS, (
 def main(argv: list[str] | None = None) -> int:
     """Counts."""
     parser = argparse.ArgumentParser(prog="python .ci/counts.py", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--list", action="store_true", help="name what is counted")
+    parser.add_argument("--list", action="store_true", help="print the items counted")
     listed = parser.parse_args(argv).list
     wrong = False
     for what, count in COUNTS.items():

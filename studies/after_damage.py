@@ -12,26 +12,25 @@ was stopped resumes.
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studies.common import ROOT, Array, publish, run_study
+from studies.common import ROOT, Array, kept_result, publish, run_study
 from studies.concealed_effects.robots import puppy
 from studies.concealed_effects.takes import filmed_takes
 from studies.other_engine.as_take import mujoco_take
 from studies.other_engine.make_session import random_camera, write_recordings
 from workbench.compare.session import load_session
 from workbench.device.tables.limits import check_limits
-from workbench.files.reading import read_text, write_whole
 from workbench.gait.adapt import TrialChooser
 from workbench.gait.certificate import PUPPY_CLAIM
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import GaitFamily, Steer, load_family
 from workbench.gait.drive.step_map import fell
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
@@ -70,7 +69,7 @@ def candidates(family: GaitFamily, cycles: int, turns: Sequence[float], paces: S
     out = []
     for turn in turns:
         for pace in paces:
-            table = gait_table(family.machine, family.shape_of(float(turn), pace))
+            table = gait_table(family.machine, family.shape_of(Steer(float(turn)), pace))
             if all(v.warning for v in check_limits(table.whole, family.machine.model)):
                 out.append(Candidate(float(turn), pace, table.commands(cycles), table.start_seconds + table.period))
     return out
@@ -123,11 +122,8 @@ def damaged(k: int, folder: Path) -> tuple[RobotModel, EffectSpec]:
 
 
 def one(k: int, out: Path, shape: GaitShape, quick: bool, tell: Callable[[str], None]) -> dict[str, Any]:
-    """One robot, from its damage to its best trial; finished results are read."""
+    """One robot, from its damage to its best trial."""
     name = f"robot{k + 1:02d}"
-    done = out / "results" / f"{name}.json"
-    if done.is_file():
-        return dict(json.loads(read_text(done)))
     folder = out / "sessions" / name
     tell(f"{name}: recording")
     model, damage = damaged(k, folder)
@@ -141,14 +137,11 @@ def one(k: int, out: Path, shape: GaitShape, quick: bool, tell: Callable[[str], 
     real = replace(model, effects=(damage,))
     healthy, said = predicted(diagnosis.nominal, gaits), predicted(diagnosis.model, gaits)
     hopeless = bool(said.max() < HOPELESS * healthy.max())
-    row = {"name": name, "damage": {"effect": damage.effect, "joint": damage.where[0], **damage.parameters},
-           "found": [[f.effect, list(f.where)] for f in diagnosis.findings], "candidates": len(gaits),
-           "intact": played(model, itself), "unchanged": played(real, itself),
-           "hopeless": hopeless, "nominal": (by_nominal := trials(healthy, real, gaits)),
-           "diagnosed": by_nominal if hopeless else trials(said, real, gaits)}
-    done.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(done, json.dumps(row, indent=1) + "\n")
-    return row
+    return {"name": name, "damage": {"effect": damage.effect, "joint": damage.where[0], **damage.parameters},
+            "found": [[f.effect, list(f.where)] for f in diagnosis.findings], "candidates": len(gaits),
+            "intact": played(model, itself), "unchanged": played(real, itself),
+            "hopeless": hopeless, "nominal": (by_nominal := trials(healthy, real, gaits)),
+            "diagnosed": by_nominal if hopeless else trials(said, real, gaits)}
 
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
@@ -157,7 +150,10 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     model = puppy_model()
     shape = load_family(GAIT, model).shape
     for k in range(count):
-        rows.append(one(k, out, shape, quick, lambda what, k=k: progress(what, k / count)))  # type: ignore[misc]
+        def tell(what: str, k: int = k) -> None:
+            progress(what, k / count)
+
+        rows.append(kept_result(out / "results" / f"robot{k + 1:02d}.json", partial(one, k, out, shape, quick, tell)))
         said = publish(out, model, _report(model, rows), {"robots": rows}, {})
     return f"{summary(rows)} {said}"
 

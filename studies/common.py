@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,13 +18,14 @@ from scipy.spatial.transform import Rotation
 
 from workbench.cli.progress import Progress
 from workbench.files import InputError
-from workbench.files.reading import write_together
+from workbench.files.reading import read_text, write_together, write_whole
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.types import Array
-from workbench.view.figures.style import styled
+from workbench.view.figures.style import in_house_style
 from workbench.view.report.page import Report
 
+T = TypeVar("T")
 ROOT = Path(__file__).resolve().parents[1]
 
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
@@ -53,6 +55,15 @@ def body_track(take: Take, times: Array) -> Array:
     return np.column_stack([p, roll, heading - heading[0], pitch])[1:]
 
 
+def kept_result(path: Path, make: Callable[[], T]) -> T:
+    """The content of a JSON file, computed and written at the first call, so that an interrupted study resumes."""
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, json.dumps(make(), indent=1) + "\n")
+    result: T = json.loads(read_text(path))
+    return result
+
+
 def body_end(take: Take, seconds: float) -> Array:
     """COORDINATES (6,) of the body so long after the first command; whole turns on the way are counted."""
     return np.asarray(body_track(take, np.linspace(0.0, seconds, 2 + int(seconds / 0.02)))[-1])
@@ -64,7 +75,7 @@ def sign(value: float, digits: int = 1) -> str:
     return ("0" + text[2:] if float(text) == 0 and text.startswith("-") else text).replace("-", "−")
 
 
-@styled
+@in_house_style
 def png(figure: Figure) -> bytes:
     """A figure's PNG."""
     out = io.BytesIO()

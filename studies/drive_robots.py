@@ -11,21 +11,20 @@ the limit on the turn binds. Errors count from 0.8 m on; headings are means over
 
 from __future__ import annotations
 
-import json
 import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studies.common import ROOT, Array, publish, run_study, sign
-from workbench.files.reading import read_text, write_whole
+from studies.common import ROOT, Array, kept_result, publish, run_study, sign
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.drive.controller import CycleController
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import STRAIGHT, GaitFamily, load_family
 from workbench.gait.drive.loop import Driven, drive
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
@@ -94,7 +93,7 @@ def planning_time(step_map: StepMap, options: DriveOptions, plans: int = 200) ->
         targets = np.cumsum(0.2 * rng.standard_normal(options.horizon + 1))
         began = time.process_time()
         left, off, bias = rng.normal(0.0, (0.05, 0.2, 0.05))
-        plan(left, off, 0.0, bias, targets, step_map, options)
+        plan(left, off, STRAIGHT, bias, targets, step_map, options)
         taken.append(time.process_time() - began)
     return float(np.median(taken))
 
@@ -123,14 +122,10 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     count = 1 if quick else ROBOTS
     milliseconds = 1000 * planning_time(step_map, DriveOptions(), 20 if quick else 200)
     runs, said = list[dict[str, Any]](), ""
-    (out / "results").mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         for k, robot in enumerate(load_ensemble().draws(model, 5 * count, SEED, Path(folder))):
-            done = out / "results" / f"drawn{k + 1:03d}.json"
-            if not done.is_file():
-                progress(f"robot {len(runs) + 1} of {count}, drawn {k + 1}", len(runs) / count)
-                write_whole(done, json.dumps(one(family, step_map, robot, k)) + "\n")
-            row = json.loads(read_text(done))
+            progress(f"robot {len(runs) + 1} of {count}, drawn {k + 1}", len(runs) / count)
+            row = kept_result(out / "results" / f"drawn{k + 1:03d}.json", partial(one, family, step_map, robot, k))
             if row is None:
                 continue
             runs.append(row)

@@ -16,13 +16,14 @@ import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
 
-from studies.common import publish, run_study, sign
+from studies.common import kept_result, publish, run_study, sign
 from studies.concealed_effects.catalogue import draw, possible
 from studies.concealed_effects.conceal import separable
 from studies.concealed_effects.robots import puppy
@@ -33,7 +34,7 @@ from studies.other_engine.make_session import random_camera, write_recordings
 from studies.other_engine.player import Rollout
 from workbench.compare.session import load_session
 from workbench.files import InputError
-from workbench.files.reading import read_text, write_whole
+from workbench.files.reading import write_whole
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import measure
@@ -148,11 +149,8 @@ def errors(said: Mapping[str, Went], true: Mapping[str, Went]) -> dict[str, floa
 
 
 def one(vault: Vault, k: int, out: Path, count: int, tell: Callable[[str], None]) -> dict[str, Any]:
-    """One robot, from its making to its score; finished results are read."""
+    """One robot, from its making to its score."""
     name = f"robot{k + 1:02d}"
-    done = out / "results" / f"{name}.json"
-    if done.is_file():
-        return dict(json.loads(read_text(done)))
     folder = out / "sessions" / name
     tell(f"{name}: recording")
     model = robot(vault, k, folder)
@@ -169,11 +167,9 @@ def one(vault: Vault, k: int, out: Path, count: int, tell: Callable[[str], None]
     tell(f"{name}: predictions {digest}; playing")
     real = hidden_robot(vault, name, model)
     true = {n: went(mujoco_take(real, g.commands, g.seconds), real, g) for n, g in motions.items()}
-    row = {"name": name, "sha256": digest, "verdict": diagnosis.verdict, "found": [f.effect for f in diagnosis.findings],
-           "hidden": [e.effect for e in real.effects], "true": {n: vars(w) for n, w in true.items()},
-           **{who: errors(s, true) for who, s in said.items()}}
-    write_whole(done, json.dumps(row, indent=1) + "\n")
-    return row
+    return {"name": name, "sha256": digest, "verdict": diagnosis.verdict, "found": [f.effect for f in diagnosis.findings],
+            "hidden": [e.effect for e in real.effects], "true": {n: vars(w) for n, w in true.items()},
+            **{who: errors(s, true) for who, s in said.items()}}
 
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
@@ -185,7 +181,10 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         raise InputError(None, str(e)) from None
     rows, said = list[dict[str, Any]](), ""
     for k in range(count):
-        rows.append(one(vault, k, out, motions, lambda what, k=k: progress(what, k / count)))  # type: ignore[misc]
+        def tell(what: str, k: int = k) -> None:
+            progress(what, k / count)
+
+        rows.append(kept_result(out / "results" / f"robot{k + 1:02d}.json", partial(one, vault, k, out, motions, tell)))
         model = load_session(out / "sessions/robot01/session.yaml").model
         said = publish(out, model, _report(model, rows, vault), {"robots": rows, "seal": vault.digest()}, {})
     return said

@@ -1,4 +1,4 @@
-"""A session that answers in lines: what each effect's numbers do is said, and fits come to their end at once."""
+"""A session with linear responses: each parameter's effect is given, and fits converge at once."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.robot import puppy_model
 
 COUNT = 900
-"""Of what is seen."""
+"""Number of observations."""
 
 
 def candidate(name):
@@ -31,7 +31,7 @@ def names(sets):
 
 
 class LinearSearch:
-    """does: by effect, what each of its numbers does at its typical size, on one take; sizes: what is hidden."""
+    """does: by effect, the response to each parameter at its typical size, on one take; sizes: the hidden truth."""
 
     fitted, nominal = (0,), None
 

@@ -1,4 +1,4 @@
-"""The demo does what it says."""
+"""The demo end to end."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Each verb end to end on a small arm: what it writes, and what it refuses."""
+"""Each verb end to end on a small arm: files written, and input refused."""
 
 import json
 from pathlib import Path

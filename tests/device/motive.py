@@ -1,4 +1,4 @@
-"""An emulated Motive on real sockets, and what it sees."""
+"""An emulated Motive on real sockets, and the bodies it captures."""
 
 import math
 import socket

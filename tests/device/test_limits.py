@@ -1,4 +1,4 @@
-"""What the servos cannot do is found, and not exported unless forced."""
+"""Motions beyond the servos' limits are found, and exported only with --force."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Short sessions of robots with a known effect, as cameras see them: what the table of diagnoses is tried on."""
+"""Short captured sessions of robots with a known effect, used by the table of diagnoses."""
 
 from __future__ import annotations
 

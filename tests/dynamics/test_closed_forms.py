@@ -1,4 +1,4 @@
-"""Inverse dynamics against what can be worked out on paper."""
+"""Inverse dynamics against closed-form solutions."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -15,7 +15,7 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 def _held(model: RobotModel, angle: float) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Torques that hold the arm still with joint `one` at `angle` [rad], and what was remarked."""
+    """Torques that hold the arm still with joint `one` at `angle` [rad], and the warnings."""
     machine = InverseDynamics(model, "fixed")
     q = np.zeros((1, 3))
     q[0, model.joints.index("one")] = angle

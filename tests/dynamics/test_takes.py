@@ -1,4 +1,4 @@
-"""Inverse dynamics of takes: derivatives with gaps and noise, what was not seen, files, and a simulated walk."""
+"""Inverse dynamics of takes: derivatives with gaps and noise, unseen channels, files, and a simulated walk."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -236,7 +236,7 @@ def test_a_result_comes_back_from_its_file(model: RobotModel, tmp_path: Path) ->
 
 
 def test_the_margins_have_the_uncertainty_of_noise(model: RobotModel) -> None:
-    """Ten times the noise, ten times the standard deviation; and the table shows it beside the margin."""
+    """Ten times the noise, ten times the standard deviation, which the table shows next to the margin."""
     take, _ = waving(model, seconds=0.5)
     results = [inverse_dynamics(model, replace(take, source="motive", q_sigma=np.full(take.q.shape, noise)), draws=8, window=0.1)
                for noise in (1e-4, 1e-3)]

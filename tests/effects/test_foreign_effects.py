@@ -1,4 +1,4 @@
-"""Effects of other packages: what is wrong with one is told in one line that names package, entry point, effect and hook."""
+"""Effects of other packages: an error in one is reported in a line that names package, entry point, effect and hook."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def test_friction_of_a_load_brakes_a_joint_by_what_it_hands_on(tmp_path, plant):
 @each_plant
 @pytest.mark.parametrize(("share", "held"), [(0.95, True), (1.06, False)])
 def test_friction_of_a_load_is_more_at_rest(tmp_path, plant, share, held):
-    """Let go, the load stays where friction of load at rest, k + s of what is handed on, holds it: f = c + (k + s) f."""
+    """A released load stays where static load friction, k + s times the transmitted torque, holds it: f = c + (k + s) f."""
     servo = replace(DRY, coulomb_friction=0.03)
     rubbing = terms(tmp_path, servo, "load_friction", coefficient=0.2, static=0.3, speed=5.0)
     rig = make_rig(tmp_path, servo, terms=rubbing, **plant)

@@ -13,7 +13,7 @@ from workbench.identify.evidence.search import lockstep
 
 
 def refuted(rollouts, names: dict[str, float]):
-    """Names of effects at these sizes that are refuted, with by how much [nats]."""
+    """Names of the effects that are refuted at these sizes, with the evidence against each [nats]."""
     after, found, _ = searched(rollouts)
     best = found.best
     h = best.hypothesis.without(lambda c: True)

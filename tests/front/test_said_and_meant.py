@@ -1,4 +1,4 @@
-"""What is mistyped gets a guess; what Python is given is checked before Drake is."""
+"""Misspelled names are answered with the likely one; Python arguments are checked before Drake is called."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@ def test_a_robot_is_described_by_its_floor_and_supply_alone():
 
 
 def test_a_summary_has_these_numbers_of_robots_that_stand():
-    """One of four fell: speeds and falls are of all, the rest of those that stand."""
+    """One of four robots fell: speeds and falls count all four, the other measures only those still standing."""
     turning = replace(WALKED, turn_rate=0.3 * np.radians(10.0))
     feet = FeetMeasure(slip=0.01, clearance=0.004, tipping=0.1)
     robots = [Drawn("r", WALKED, FEET), Drawn("r", turning, feet), Drawn("r", WALKED, FEET), Drawn("r", fallen(15), feet, "fell")]

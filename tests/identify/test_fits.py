@@ -107,7 +107,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     best = max(trials, key=lambda t: t.gain["choose"])
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)
-    refined = search.refined(search.refit(search.evaluate([(best.candidate, best.x)]), (0,), 2))
+    refined = search.refine(search.refit(search.evaluate([(best.candidate, best.x)]), (0,), 2))
     noise = np.count_nonzero(search.evaluator.vector(nominal.residuals, "validate"))
     assert refined.cost["validate"] - noise < 0.2 * (nominal.cost["validate"] - noise)
     (sd,) = np.sqrt(np.diag(refined.covariance))
@@ -216,8 +216,8 @@ def test_what_fixed_base_takes_identified_keeps_its_numbers_beside_what_is_fitte
     assert alone.x == pytest.approx(search.settled.x)
 
 
-@pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes do not mind", "they speak against it"])
-def test_most_from_floating_when_commands_come_unless_fixed_base_takes_speak_against_it(left, late):
+@pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes allow it", "held takes contradict it"])
+def test_most_from_floating_when_commands_come_unless_fixed_base_takes_contradict_it(left, late):
     delay = Candidate.of(known_effects()["command_delay"], ("three",), (0.0,))
 
     def fit(x, held):

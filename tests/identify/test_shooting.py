@@ -1,4 +1,4 @@
-"""Windows of floating-base takes: where they begin, what is read off there, and what then tells nothing."""
+"""Windows of floating-base takes: their starts, the states read there, and the frames ignored after them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Servo logs that cannot be what they say are told by joint and time, and mended where that is certain."""
+"""Implausible servo logs are reported by joint and time, and repaired where the repair is certain."""
 
 from __future__ import annotations
 

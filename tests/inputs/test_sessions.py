@@ -1,4 +1,4 @@
-"""`inspect` opens every file of a session and reports what the other verbs report; full disks, and files of killed runs."""
+"""`inspect` opens every file of a session and reports the errors of the other verbs; full disks, and files of killed runs."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def test_savitzky_golay_keeps_a_cubic_and_has_no_lag() -> None:
 
 
 def test_derivatives_filtered_alone_drift_from_the_angle() -> None:
-    """What the thesis's own filter does to cubics that rest at each pose: the speed no longer belongs to the angle."""
+    """The thesis's own filter on cubics that rest at each pose: the speed is no longer the angle's derivative."""
     raw = interpolate_motion(WALK, cycles=4, knots="rest")
     filtered = filter_derivatives(raw, window=1001)
     assert np.array_equal(filtered.q, raw.q)

@@ -1,4 +1,4 @@
-"""Where a servo log begins: its velocity is told only where the first positions tell more than their noise."""
+"""The start of a servo log: its velocity is estimated only where the first positions move by more than their noise."""
 
 import numpy as np
 import pytest

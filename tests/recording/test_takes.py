@@ -1,4 +1,4 @@
-"""From rigid bodies to joint angles: yaw, pivots, start, base path, and what they do not swallow."""
+"""From rigid bodies to joint angles: yaw, pivots, start, base path, and the errors that these must not absorb."""
 
 from dataclasses import replace
 
@@ -145,7 +145,7 @@ def test_unknown_asset_markers_only_and_nothing_solved_are_refused(model):
 
 
 def test_a_simulated_take_through_the_measurement_is_what_the_cameras_saw(model):
-    """Observe, then register and read what was observed: the same angles, path and pivots, droop and tilt included."""
+    """Observing a rollout, then registering and reading it, gives the same angles, path and pivots, droop and tilt included."""
     t = np.arange(-0.3, 2.4, 1e-3)
     n = len(model.joints)
     droop = np.deg2rad(np.linspace(-3, 3, n))
@@ -182,7 +182,7 @@ def test_a_simulated_take_through_the_measurement_is_what_the_cameras_saw(model)
 
 
 def test_a_held_robot_that_droops_turns_about_axes_that_droop(model):
-    """What observe sees across the axes is what is read off the bodies, though only joints droop at rest."""
+    """`observe` gives the same off-axis rotations as reading the bodies, although only joints droop at rest."""
     t = np.arange(-0.3, 2.4, 1e-3)
     n = len(model.joints)
     simulated = Take("s", "simulation", t, model.joints, motion(t, n) + np.deg2rad(np.linspace(-3, 3, n)), starts_at=0.0,

@@ -1,4 +1,4 @@
-"""model.yaml: what goes in comes out, and what is wrong is named."""
+"""model.yaml: the round trip, and errors that name the wrong entry."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def test_signs_are_those_of_the_table_and_mirror_each_other():
 
 
 def test_signs_are_those_of_the_servos_as_drawn():
-    """Seen from the horn a servo turns counterclockwise: so does what the horn carries; what carries the case turns against."""
+    """Seen from the horn, a servo and the link on its horn turn counterclockwise; a link on its case turns the other way."""
     signs = read_signs(ROOT / "data/joint_signs.csv")
     tree = {link.name: link for link in links(TABLE.length)}
     servos = [(link, link.p_BL + at.p_LP, at.R_LP[:, 2]) for link in tree.values() for at in link.parts if at.part == "ax12a"]

@@ -1,4 +1,4 @@
-"""A robot's file that is written anew in one process, as studies and other projects do, is read anew."""
+"""A robot file that is rewritten within one process, as studies and other projects do, is read again."""
 
 from workbench.robot import Kinematics, RobotModel, foot_points
 

@@ -17,7 +17,7 @@ from workbench.robot import Ground, RobotModel, ServoConstants, data_file, load_
 from workbench.simulation.compiled.tables import NotCoveredError
 
 MEDIAN, MOST = 1e-8, 1e-4
-"""Of differences of velocities [rad/s, m/s]: half of all steps, and 99 in 100, are nearer."""
+"""Upper bounds on the median and the 99th percentile of velocity differences [rad/s, m/s]."""
 KNOWN_TO_DRAKE_ALONE: set[str] = set()
 
 

@@ -1,4 +1,4 @@
-"""Drake judges the compiled station in every diagnosis; rollouts are remembered by what they depend on."""
+"""Drake judges the compiled station in every diagnosis; rollouts are cached by everything they depend on."""
 
 from __future__ import annotations
 

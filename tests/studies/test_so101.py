@@ -1,4 +1,4 @@
-"""The SO-101's study: its arm and session, and that its measurements find what was put into made-up programmes."""
+"""The SO-101's study: its arm and session, and that its measurements recover the parameters of synthetic programmes."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ DT = 0.02
 
 
 def made_up(name: str, seed: int, lag: float = 0.08, friction: float = 0.006, compliance: float = 0.08) -> Rows:
-    """A programme in which joint 1 (Pitch) obeys the regression's own law exactly, under a load that goes with its angle, and the
-    others follow at once; the goal is what makes it so."""
+    """A programme in which joint 1 (Pitch) obeys the regression's own law exactly, under a load that depends on its angle, and
+    the others follow at once; the goal is computed from that law."""
     rng = np.random.default_rng(seed)
     t = np.arange(0, 40, DT)
     slow, fast = 2 * np.pi * rng.uniform(0.1, 0.4), 2 * np.pi * rng.uniform(0.5, 0.8)

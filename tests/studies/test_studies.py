@@ -1,4 +1,4 @@
-"""What the studies share: the body in the thesis's axes, and one line for an output folder that cannot be written."""
+"""Shared parts of the studies: the body in the thesis's axes, and one line for an output folder that cannot be written."""
 
 from __future__ import annotations
 

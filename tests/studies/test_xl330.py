@@ -1,4 +1,4 @@
-"""The rig's study: what it simulates and fits with, on cases with known answers, and on the recordings where they are at hand."""
+"""The rig's study: its simulation and fits, on cases with known answers, and on the recordings where available."""
 
 from __future__ import annotations
 

@@ -139,7 +139,8 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     played = TakesAsPlayed(sent, without=settings.without)
     evaluator, missed = played.without_missed(known.model, begun.residuals)
     unloaded = unloaded_joints(known.model, evidence)
-    pool = build.asked(candidates(known.model, evidence, unloaded)) + read_off_candidates(known.model, evidence, begun.residuals)
+    pool = build.select_untried(candidates(known.model, evidence, unloaded))
+    pool += read_off_candidates(known.model, evidence, begun.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
@@ -200,8 +201,8 @@ def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
     """Each take before and after. fitted: the model with its effects; None: nothing was found."""
-    was = [e.take.observed(nominal[e.name]) for e in evaluator.evidence]
-    now = was if fitted is None else evaluator.observed(fitted, evaluator.config)
+    was = [e.take.observe(nominal[e.name]) for e in evaluator.evidence]
+    now = was if fitted is None else evaluator.observe(fitted, evaluator.config)
     out = []
     for i, e in enumerate(evaluator.evidence):
         ill = channel_gaps(e, before[i])

@@ -11,7 +11,7 @@ RNG = np.random.default_rng(3)
 AHEAD, BELOW, INERTIA, CEILING = RNG.normal(size=(4, COUNT))
 DOES = {"payload": [INERTIA, AHEAD, 0 * AHEAD, BELOW], "parallel_spring": [BELOW], "zero_offset": [AHEAD],
         "torque_ceiling": [CEILING]}
-"""What each effect's numbers do: a load pulls as a spring and a zero askew do together, and is slow besides."""
+"""Response to each effect's parameters: a load acts like a spring and a zero offset together, and also slows the joint."""
 FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2, 0.0, 0.5], "zero_offset": [1.5]}
 
 

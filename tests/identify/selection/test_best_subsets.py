@@ -58,7 +58,7 @@ def test_a_walk_and_what_one_explains_are_left_to_single_effects():
 
 
 def test_pairs_that_lines_predict_about_as_well_are_all_fitted():
-    """A slow clock and waits that grow with each pose look alike from afar."""
+    """A slow clock and a timing drift have nearly the same response."""
     rng = np.random.default_rng(6)
     sag, late, noise = rng.normal(size=(3, 400))
     pool = [seen("supply_sag", sag), seen("clock_rate", late), seen("timing_drift", late + 0.1 * noise)]
@@ -68,7 +68,7 @@ def test_pairs_that_lines_predict_about_as_well_are_all_fitted():
 
 @pytest.mark.parametrize(("elsewhere", "again"), [(40.0, True), (60.0, False)])
 def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_far_less(elsewhere, again):
-    """Stribeck friction's speed and torque leave a valley that bends: what a fit ends at is beside it."""
+    """Stribeck friction's speed and torque share a curved valley, and a fit ends off its floor."""
     friction, play = (trial(n).candidate for n in ("stribeck_friction", "backlash"))
     begun = []
 

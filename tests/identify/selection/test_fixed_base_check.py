@@ -13,7 +13,7 @@ CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 
 
 class TwoWorlds:
-    """A fixed-base take (0) and a walk (1); what each leaves of a ceiling's size, None being without it."""
+    """A fixed-base take (0) and a walk (1): the residual of each by size of a torque ceiling; None: without a ceiling."""
 
     fixed_base, fitted, settled = (0,), (0, 1), None
     evaluator = SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values())))

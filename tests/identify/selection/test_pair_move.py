@@ -13,7 +13,7 @@ from workbench.identify.selection.record import SelectionStep
 FORWARD, LEFT, SLIPPERY, LIFTS, SOFT = np.random.default_rng(4).normal(size=(5, COUNT)) * 2.0
 DOES = {"ground_tilt": [FORWARD, LEFT], "tether_force": [FORWARD, LEFT, 0.8 * SLIPPERY + 0.6 * LIFTS],
         "ground_friction": [SLIPPERY], "soft_ground": [SOFT], "backlash": [LIFTS], "payload": [LIFTS] * 4}
-"""What each number of an effect does to a walk at its typical size: a pull upwards is much like a slippery floor."""
+"""Response of a walk to each parameter at its typical size: an upward pull acts much like a slippery floor."""
 
 
 def found(search, name, *rivals, closed=0.6):

@@ -11,7 +11,7 @@ from workbench.identify.selection.reevaluation import reevaluate
 SAGS, SPRING, WEAK, FADES = np.random.default_rng(5).normal(size=(4, COUNT))
 DOES = {"supply_voltage": [0.8 * SAGS + 0.5 * SPRING + 0.3 * WEAK], "supply_sag": [SAGS], "thermal_fade": [SAGS + 0.5 * FADES],
         "parallel_spring": [SPRING]}
-"""A weak supply does some of what one that sags does, and some of what a spring does."""
+"""The response to a weak supply overlaps with those to a sagging supply and to a spring."""
 
 
 def explained(search, *names):

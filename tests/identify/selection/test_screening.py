@@ -1,4 +1,4 @@
-"""What keeps a search short: guesses near what was looked at, rules instead of differences, nothing rolled out in vain."""
+"""Shortcuts of a search: starts from earlier responses, secant updates instead of differences, and no needless rollouts."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -15,7 +15,7 @@ from workbench.identify.selection.screening import CandidateEvaluation
 
 
 def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
-    """Take 0 goes with the floor's tilt, take 1 was thrown about by something else."""
+    """Take 0 correlates with the floor's tilt; take 1 was disturbed by something else."""
     rng = np.random.default_rng(1)
     line, truth = rng.normal(size=(2, 60)), np.array([1.5, -0.5])
     calm, wild = -truth @ line, 50 * rng.normal(size=60)
@@ -25,7 +25,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
 
     def calmest(explained, least=0.0):
         trying = CandidateEvaluation.__new__(CandidateEvaluation)
-        trying.evaluator = SimpleNamespace(expected=lambda takes, use: 60.0,
+        trying.evaluator = SimpleNamespace(expected_cost=lambda takes, use: 60.0,
                                       stretches=lambda takes, use: np.repeat([0, PROBLEM.most_stretches], 60))
         trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
         trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
@@ -39,7 +39,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
 
 
 def test_one_number_looks_far_where_slopes_are_noise():
-    """Where a foot grips or slips, a small move makes worse what a large one mends."""
+    """Where a foot grips or slips, a small step raises the cost and a large one lowers it."""
     def left(x: list[float]) -> np.ndarray:
         return np.array([abs(x[0] - 1.6) + (0.5 if 1.02 < x[0] < 1.2 else 0.0)])
 
@@ -60,7 +60,7 @@ def test_one_number_looks_far_before_it_settles_on_a_little():
 
 
 def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
-    """What a walk leaves answers moves of a tenth with noise, of the size of the vector with what the number does."""
+    """A walk's residual responds to steps of a tenth with noise as large as the parameter's own response."""
     def left(x: np.ndarray) -> np.ndarray:
         noise = 0.3 * np.sin(40.0 * x[1])
         return np.array([x[0] - 10.0, 0.2 * (x[1] - 6.0) + noise, 3.0])

@@ -40,7 +40,7 @@ def frames(e: TakeEvidence) -> NDArray[np.bool_]:
 
 
 @lru_cache(maxsize=16)
-def _held(config: SimulationConfig) -> SimulationConfig:
+def _log_config(config: SimulationConfig) -> SimulationConfig:
     """The configuration in which logs are rolled out."""
     return replace(config, base="fixed", settle=SETTLE)
 
@@ -49,7 +49,7 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
                ) -> list[Array] | None:
     """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
     config: base and rest apart, which are a log's. horizon [s]: of windows, each of which starts from the recorded state."""
-    held = _held(config)
+    held = _log_config(config)
     models: dict[str, RobotModel] = {}
     jobs = []
     for e in takes:

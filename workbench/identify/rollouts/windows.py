@@ -7,28 +7,23 @@ linearly on the errors of the model (multiple shooting; H. G. Bock, Springer Ser
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.cache import Cache
 from workbench.compare.session_takes import RegisteredTake
 from workbench.identify.options import PROBLEM
 from workbench.simulation.steady import JointStates
 from workbench.types import Array
 
-_known: OrderedDict[tuple[int, float], tuple[RegisteredTake, JointStates]] = OrderedDict()
+_known: Cache[JointStates] = Cache(PROBLEM.states_kept)
 
 
 def recorded_states(take: RegisteredTake, horizon: float) -> JointStates:
     """Of a servo log's joints, every `horizon` [s] after its first command; the same object for the same take."""
-    key = (id(take), horizon)
-    if key not in _known:
-        _known[key] = (take, _read(take, horizon))
-        while len(_known) > PROBLEM.states_kept:
-            _known.popitem(last=False)
-    return _known[key][1]
+    return _known.get((id(take), horizon), lambda: _read(take, horizon), held=take)
 
 
 def _read(take: RegisteredTake, horizon: float) -> JointStates:

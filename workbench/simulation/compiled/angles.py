@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.cache import Cache
 from workbench.simulation.compiled.arrays import Ints, Schedule
 from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.station import CompiledJob
@@ -16,7 +16,6 @@ from workbench.simulation.job import Job
 from workbench.simulation.steady import JointStates
 from workbench.types import Array
 
-T = TypeVar("T")
 KEPT = 256
 """Schedules of commands, and ways to read a log, that are kept, as a session's takes are played again and again."""
 
@@ -33,8 +32,8 @@ class _Reading(NamedTuple):
     put: list[tuple[Ints, Array, Array]]
 
 
-_schedules: OrderedDict[Any, tuple[object, Schedule]] = OrderedDict()
-_readings: OrderedDict[Any, tuple[object, _Reading]] = OrderedDict()
+_schedules: Cache[Schedule] = Cache(KEPT)
+_readings: Cache[_Reading] = Cache(KEPT)
 
 
 def servo_angles(jobs: Sequence[Job]) -> list[Array]:
@@ -75,7 +74,7 @@ def _reading(compiled: CompiledJob, rows: int) -> _Reading:
         put = [] if job.restarts is None else _after_restarts(times, time, job.restarts)
         return _Reading(row, following, share, (times < time[0]) | (times > time[-1]), put)
 
-    return _kept(_readings, (rows, every, lead, times.tobytes(), id(job.restarts)), job.restarts, made)
+    return _readings.get((rows, every, lead, times.tobytes(), id(job.restarts)), made, job.restarts)
 
 
 def _after_restarts(times: Array, time: Array, restarts: JointStates) -> list[tuple[Ints, Array, Array]]:
@@ -101,14 +100,4 @@ def _schedule(compiled: CompiledJob) -> Schedule:
         return made()
     key = (id(job.commands), *vars(config).values(), compiled.model.joints, plan.lead, plan.duration, job.elapsed,
            id(job.restarts))
-    return _kept(_schedules, key, (job.commands, job.restarts), made)
-
-
-def _kept(known: OrderedDict[Any, tuple[object, T]], key: object, of: object, made: Callable[[], T]) -> T:
-    """The value under a key, made at the first call. of: objects whose ids are in the key; held, so that these stay theirs."""
-    found = known.get(key)
-    if found is None:
-        found = known[key] = (of, made())
-        while len(known) > KEPT:
-            known.popitem(last=False)
-    return found[1]
+    return _schedules.get(key, made, (job.commands, job.restarts))
