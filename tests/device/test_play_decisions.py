@@ -132,6 +132,13 @@ def test_how_far_from_neutral_a_joint_may_be(tmp_path, degrees, fine):
         assert result.poses == 0
 
 
+def test_a_joint_is_seated_where_it_hangs_by_a_single_count(tmp_path):
+    r = robot(model=arm(tmp_path))
+    offset(r, "one", lambda angle: angle - math.radians(300 / 1023))
+    result, _ = perform_on(r, tmp_path, wave(0.1), 1)
+    assert 513 in [v for t, v in goals(r.servos["one"]) if t < result.started - 0.01]
+
+
 @pytest.mark.parametrize("degrees", [8, -8])
 def test_a_joint_is_seated_by_no_more_than_is_safe(tmp_path, degrees):
     r = robot(model=arm(tmp_path))
@@ -177,9 +184,11 @@ def test_the_worst_pose_is_told_however_well_the_last_one_went(tmp_path):
 
 def test_goals_that_were_lost_before_the_motion_are_none_of_its(tmp_path):
     r = robot(angles=START, model=arm(tmp_path))
-    r.at(0.5, lambda: r.servos["two"].__setitem__("goal_position", 600))
+    for k in range(80):
+        r.at(0.5 + 0.005 * k, lambda: r.servos["two"].__setitem__("goal_position", 530))
     result, _ = perform_on(r, tmp_path, wave(0.1), 1)
     assert result.stopped == ""
+    assert result.repaired > 3
     assert result.missed == 0
 
 

@@ -45,7 +45,7 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     assert drift.effect == friction
     assert drift.first == pytest.approx(0.3, abs=0.05)
     assert drift.last == pytest.approx(0.1, abs=0.05)
-    left = drift.left([fading])
+    left = drift.as_unexplained([fading])
     assert left.where == ("three",)
     assert left.unit == "deg"
     assert left.error > 5 * left.floor > 0.0

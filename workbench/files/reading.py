@@ -26,17 +26,17 @@ def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], 
 
     def decorate(read: Callable[Concatenate[Path, P], T]) -> Callable[Concatenate[Path, P], T]:
         @lru_cache(maxsize=maxsize)
-        def known(path: Path, content: bytes | None, *args: P.args, **kwargs: P.kwargs) -> T:
+        def read_content(path: Path, content: bytes | None, *args: P.args, **kwargs: P.kwargs) -> T:
             return read(path, *args, **kwargs)
 
         @wraps(read)
-        def cached(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
+        def read_again(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
             content = None
             with suppress(OSError, InputError):  # `read` reports the error
                 content = regular_file(path, MOST_TEXT).read_bytes()
-            return known(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
+            return read_content(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
 
-        return cached
+        return read_again
 
     return decorate
 

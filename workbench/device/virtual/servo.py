@@ -245,7 +245,7 @@ class VirtualServo:
             if k not in self.profile.at:
                 return RANGE, 0
             touched[self.profile.at[k][0].name] = self.profile.at[k][0]
-        error = self._refused(touched, new)
+        error = self._refusal(touched, new)
         if error:
             return error, 0
         self._table = new
@@ -274,7 +274,7 @@ class VirtualServo:
         self._put(self.profile.by_name["goal_position"], self._count(angle))
         self._steer(self.bus.clock.now)
 
-    def _refused(self, touched: dict[str, Register], new: bytearray) -> int:
+    def _refusal(self, touched: dict[str, Register], new: bytearray) -> int:
         for register in touched.values():
             value = int.from_bytes(new[register.address:register.address + register.size], "little")
             if not register.writable or not register.low <= value <= register.high:

@@ -203,7 +203,7 @@ class Explanation:
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, with their worst event, and parameters that drift within a take."""
-        return (*left_over(evidence, after, floors), *(d.left(evidence) for d in self.drifts))
+        return (*left_over(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
         """All frames were searched: what got no name is no gap, unless it shows."""

@@ -103,7 +103,7 @@ class Selected:
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
-        drifting = (d.left(evidence) for d in self.drifts)
+        drifting = (d.as_unexplained(evidence) for d in self.drifts)
         return (*list_unexplained(evidence, after, floors), *drifting, *downward_pulls(self.fit))
 
     def is_slight(self) -> bool:

@@ -26,7 +26,7 @@ def odd_table(head: bytes) -> str | None:
     if long_table(split_row(lines[0])):
         return ("a table with one number in each row: give each channel a column, with pandas' pivot(index='time', columns=..., "
                 "values='value')")
-    return _header_below(text.splitlines()) or _transposed(lines)
+    return _header_below(text.splitlines()) or _find_transposed(lines)
 
 
 def long_table(names: Sequence[str]) -> bool:
@@ -73,7 +73,7 @@ def _names_a_log(cells: list[str]) -> bool:
         any(re.search(r"goal|position|action|command|target|\.q[wxyz]$", c) for c in lower)
 
 
-def _transposed(lines: list[str]) -> str | None:
+def _find_transposed(lines: list[str]) -> str | None:
     rows = [split_row(line) for line in lines[:4]]
     names = sum(number_of(row[0]) is None for row in rows)
     numbers = all(len(row) > 8 and all(number_of(c) is not None for c in row[1:] if c) for row in rows)

@@ -96,7 +96,7 @@ def joint_grid(
     for axes in grid[::3]:
         axes.set_ylabel("angle [deg]")
     handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=4)
+    figure.legend(handles, labels, loc="upper right", ncols=4)
     return figure
 
 

@@ -39,7 +39,7 @@ def joint_torques(
         axes.set_xlabel("time [s]")
     for axes in grid[::3]:
         axes.set_ylabel("torque [N m]")
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="upper right", ncols=4)
     return figure
 
 

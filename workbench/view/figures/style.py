@@ -55,6 +55,11 @@ _RC: dict[str, Any] = {
     "axes.unicode_minus": True,
 }
 
+LEFT, RIGHT, ABOVE, BELOW = 0.85, 0.15, 0.65, 0.6
+"""Room [inches] for an axis' label and its numbers, for a legend over the titles, and for the time axis."""
+ASIDE, BETWEEN = 0.65, 0.42
+"""Between panels side by side, for numbers of six characters, and between rows, for titles."""
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -90,10 +95,17 @@ def legend_above(axes: Axes) -> None:
 
 
 def panels(count: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """A figure of `count` panels in rows of `columns` that share their time axis; `height` of one row [inches]."""
+    """A figure of `count` panels in rows of `columns` that share their time axis; `height` of one row [inches]. Its margins are
+    fixed, as labels are as large in every such figure, and solving for them takes as long as drawing some of the curves."""
     rows = -(-count // columns)
-    figure = new_figure(width, height * rows + 0.6)
-    grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
+    tall = height * rows + 0.6
+    figure = new_figure(width, tall)
+    figure.set_layout_engine("none")
+    across = (width - LEFT - RIGHT - ASIDE * (columns - 1)) / columns
+    down = (tall - ABOVE - BELOW - BETWEEN * (rows - 1)) / rows
+    place = {"left": LEFT / width, "right": 1 - RIGHT / width, "bottom": BELOW / tall, "top": 1 - ABOVE / tall,
+             "wspace": ASIDE / across, "hspace": BETWEEN / down}
+    grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False, gridspec_kw=place).flat)
     for axes in grid[count:]:
         axes.set_axis_off()
     return figure, grid[:count]

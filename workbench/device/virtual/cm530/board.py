@@ -62,7 +62,7 @@ class Board:
         self.directions: list[tuple[int, bool, bool]] = []
         self.resets: list[tuple[int, int]] = []
         self._rng = random.Random(seed)
-        self.cpu = Processor(clock, self._read, self._write, self._pending, self._taken)
+        self.cpu = Processor(clock, self._read, self._write, self._pending, self._on_taken)
         self.cpu.uc.mem_write(APPLICATION, image)
         self.clocks, self.core, self.watchdog = Clocks(self), Core(self), Watchdog(self)
         self.ports = {name: Port(self, (0x18, 2 + k)) for k, name in enumerate("ABCD")}
@@ -161,7 +161,7 @@ class Board:
                 return 16 + irq
         return None
 
-    def _taken(self, number: int) -> None:
+    def _on_taken(self, number: int) -> None:
         if number == SYSTICK:
             self.core.tick_waits = False
 

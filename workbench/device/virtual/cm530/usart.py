@@ -111,14 +111,14 @@ class Usart(Peripheral):
         self._sends(data, self.rate, start)
         epoch = self._epoch
 
-        def done() -> None:
+        def finish_block() -> None:
             if epoch != self._epoch:
                 return
             self.words[SR] |= TC | TXE
             ended()
             self.board.cpu.wish()
 
-        self.board.clock.at(self._shifting_until, done)
+        self.board.clock.at(self._shifting_until, finish_block)
 
     @property
     def sending(self) -> bool:
