@@ -47,7 +47,7 @@ def _ratio(name: str, e: TakeEvidence, model: RobotModel, length: float, repeats
         assert channels is not None
         return channels
 
-    runs = {"observed": lambda: e.simulated(run_job(rollout.job), model), "compiled": compiled}
+    runs = {"observed": lambda: e.observe(run_job(rollout.job), model), "compiled": compiled}
     apart = float(np.nanmax(np.abs(runs["observed"]() - compiled())))
     seconds = in_turns(runs, repeats)
     value, quartiles = median_and_quartiles(seconds["observed"] / seconds["compiled"])

@@ -132,7 +132,7 @@ def _fitted(mine: Session, evidence: list[TakeEvidence], iterations: int) -> Our
 
 def _refined(mine: Session, evidence: list[TakeEvidence], fit: Fit) -> Ours:
     evaluator = RolloutEvaluator(evidence, CONFIG, 1)
-    return _told(evaluator, Search(evaluator, mine.model).refined(fit))
+    return _told(evaluator, Search(evaluator, mine.model).refine(fit))
 
 
 def _told(evaluator: RolloutEvaluator, fit: Fit) -> Ours:

@@ -30,7 +30,7 @@ from workbench.compare.session import load_session
 from workbench.device.tables.limits import check_limits
 from workbench.gait.adapt import TrialChooser
 from workbench.gait.certificate import PUPPY_CLAIM
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import GaitFamily, Steer, load_family
 from workbench.gait.drive.step_map import fell
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
@@ -69,7 +69,7 @@ def candidates(family: GaitFamily, cycles: int, turns: Sequence[float], paces: S
     out = []
     for turn in turns:
         for pace in paces:
-            table = gait_table(family.machine, family.shape_of(float(turn), pace))
+            table = gait_table(family.machine, family.shape_of(Steer(float(turn)), pace))
             if all(v.warning for v in check_limits(table.whole, family.machine.model)):
                 out.append(Candidate(float(turn), pace, table.commands(cycles), table.start_seconds + table.period))
     return out

@@ -22,7 +22,7 @@ from workbench.files.reading import read_text, write_together, write_whole
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.types import Array
-from workbench.view.figures.style import styled
+from workbench.view.figures.style import in_house_style
 from workbench.view.report.page import Report
 
 T = TypeVar("T")
@@ -75,7 +75,7 @@ def sign(value: float, digits: int = 1) -> str:
     return ("0" + text[2:] if float(text) == 0 and text.startswith("-") else text).replace("-", "−")
 
 
-@styled
+@in_house_style
 def png(figure: Figure) -> bytes:
     """A figure's PNG."""
     out = io.BytesIO()

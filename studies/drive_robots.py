@@ -24,7 +24,7 @@ import numpy as np
 from studies.common import ROOT, Array, kept_result, publish, run_study, sign
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.drive.controller import CycleController
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import STRAIGHT, GaitFamily, load_family
 from workbench.gait.drive.loop import Driven, drive
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
@@ -93,7 +93,7 @@ def planning_time(step_map: StepMap, options: DriveOptions, plans: int = 200) ->
         targets = np.cumsum(0.2 * rng.standard_normal(options.horizon + 1))
         began = time.process_time()
         left, off, bias = rng.normal(0.0, (0.05, 0.2, 0.05))
-        plan(left, off, 0.0, bias, targets, step_map, options)
+        plan(left, off, STRAIGHT, bias, targets, step_map, options)
         taken.append(time.process_time() - began)
     return float(np.median(taken))
 

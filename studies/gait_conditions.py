@@ -27,7 +27,7 @@ from workbench.motion import Commands, load_motion
 from workbench.robot import GRAVITY, EffectSpec, RobotModel, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import by_joint, footfalls, joint_grid, phase_portrait, stance_of
-from workbench.view.figures.style import OTHERS, SIMULATED, new_figure, styled
+from workbench.view.figures.style import OTHERS, SIMULATED, in_house_style, new_figure
 from workbench.view.report.page import Details, Picture, Provenance, Report, Section, Table, Text
 
 GAITS = ROOT / "runs/gaits"
@@ -152,7 +152,7 @@ def _floors(model: RobotModel, quick: bool) -> list[tuple[str, RobotModel]]:
     return out + [(name, model.with_effect(effect)) for name, effect in (tilts | soft).items()]
 
 
-@styled
+@in_house_style
 def _map(speeds: Mapping[str, Mapping[str, float]]) -> Figure:
     kinds = {"friction": "friction of the pair", "slope": "slope [deg]", "stiffness": "stiffness of a contact point [N/m]",
              "boxes": "tallest box [mm]"}

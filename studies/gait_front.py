@@ -23,7 +23,7 @@ from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import MEMORY, optimize, options_of, robotis_walk, write_gait
 from workbench.gait.request import Request
 from workbench.robot import ServoConstants, puppy_model
-from workbench.view.figures.style import ACCENT, OTHERS, SIMULATED, new_figure, styled
+from workbench.view.figures.style import ACCENT, OTHERS, SIMULATED, in_house_style, new_figure
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 SPEEDS = (0.05, 0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40)
@@ -91,7 +91,7 @@ def _front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                                        o["RMS torque N m"] < r["RMS torque N m"] for o in kept)]
 
 
-@styled
+@in_house_style
 def _drawn(rows: list[dict[str, Any]], walk: tuple[float, float]) -> Figure:
     figure = new_figure(7, 4.5)
     axes = figure.subplots()

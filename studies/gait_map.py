@@ -2,8 +2,9 @@
 
     python -m studies.gait_map [--out runs/studies/gait_map] [--quick]
 
-Needs the extra [map]. The search (pyribs) keeps in each cell the gait whose motion differs least over drawn robots; each cell is
-then played on fresh ones. With a Dask cluster: `with joblib.parallel_config(backend="dask"): build_map(...)`.
+Needs the extra [map]. The search (pyribs) keeps in each cell the gait whose motion differs least over a few drawn robots; these
+gaits are measured on others, and each cell is then played on fresh ones. With a Dask cluster: `with
+joblib.parallel_config(backend="dask"): build_map(...)`.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.gait_map import GaitMap, MapOptions, build_map
 from workbench.robot import puppy_model
-from workbench.view.figures.style import new_figure, styled
+from workbench.view.figures.style import in_house_style, new_figure
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table
 
-QUICK = MapOptions(generations=2, batch=6, robots=1, fresh=1, seconds=1.0)
+QUICK = MapOptions(generations=2, batch=6, robots=1, measured=1, fresh=1, seconds=1.0)
 
 
-@styled
+@in_house_style
 def drawn(found: GaitMap) -> Figure:
     """The cells' speeds and turning: filled where fresh robots reproduce them."""
     figure = new_figure(6, 5)

@@ -33,7 +33,7 @@ from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
 from workbench.robot import RobotModel, puppy_model
-from workbench.view.figures.style import new_figure, styled
+from workbench.view.figures.style import in_house_style, new_figure
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table
 
 GAIT = ROOT / "data/gaits/demo/gait.csv"
@@ -116,7 +116,7 @@ def certified(machine: GaitMachine, shape: GaitShape, options: CertifyOptions, f
                    {"seed": SEED, "searched in": 0.0, "rollouts": 0})
 
 
-@styled
+@in_house_style
 def learning_curve(means: list[float]) -> Figure:
     """Reward over a tenth of the training each."""
     figure = new_figure(5, 3)

@@ -25,7 +25,7 @@ from workbench.experiment.design import Experiment, design_experiment
 from workbench.experiment.options import EXPERIMENT
 from workbench.motion import Motion
 from workbench.robot import EffectSpec, RobotModel
-from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, RECORDED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, RECORDED, in_house_style, legend_above, new_figure
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 SEED = 5
@@ -166,7 +166,7 @@ def probability(ratio: float) -> float:
     return 1 / (1 + math.exp(-max(min(ratio, 700.0), -700.0)))
 
 
-@styled
+@in_house_style
 def draw(o: Outcome) -> Figure:
     """The joint in the first and in the designed take: recording, and residuals of each fitted name."""
     figure = new_figure(11, 5.6)
@@ -193,7 +193,7 @@ def draw(o: Outcome) -> Figure:
     return figure
 
 
-@styled
+@in_house_style
 def draw_likelihoods(outcomes: Sequence[Outcome]) -> Figure:
     """Log-likelihood ratios before and after."""
     figure = new_figure(9, 1.4 + 0.9 * len(outcomes))

@@ -117,7 +117,7 @@ class Jury:
         played = iter(simulate_batch(jobs, self.n_jobs))
         out = []
         for e, m in zip(effects, models):
-            observed = tuple(t.observed(next(played), m) for t in self.takes)
+            observed = tuple(t.observe(next(played), m) for t in self.takes)
             out.append(Fitted(e, sum(self._cost(t, o) for t, o in zip(self.takes, observed)), observed))
         return out
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from workbench.recording import BodyTrack, Recording
-from workbench.recording.mocap.tracks import capture_axes, turned, turned_quaternion
+from workbench.recording.mocap.tracks import capture_axes, turn_quaternion, turn_vectors
 from workbench.robot import RobotModel
 
 _LEGS = {"fl": ("body", 0.06, 0.05), "fr": ("body", 0.06, -0.05), "bl": ("tail", -0.06, 0.05), "br": ("tail", -0.06, -0.05)}
@@ -87,8 +87,8 @@ def capture(model: RobotModel, yaw: float = 0.7, start: float = 0.4137, seconds:
         if noise:
             since = Rotation.from_rotvec(rng.normal(0, noise, (len(time), 3))) * since
             p_W = p_W + rng.normal(0, 1e-4, p_W.shape)
-        quat = turned_quaternion(since.as_quat(scalar_first=True), yaw)
-        bodies[asset] = BodyTrack(capture_axes(turned(p_W, yaw) + offset),
+        quat = turn_quaternion(since.as_quat(scalar_first=True), yaw)
+        bodies[asset] = BodyTrack(capture_axes(turn_vectors(p_W, yaw) + offset),
                                   np.column_stack([quat[:, 0], capture_axes(quat[:, 1:])]), np.full(len(time), 1e-4))
     recording = Recording(source="synthetic.csv", kind="motive", version="1.23", time=time, frames=np.arange(len(time)),
                           rate=rate, units="Meters", rigid_bodies=bodies, sensing="mocap")

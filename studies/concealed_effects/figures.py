@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from studies.concealed_effects.score import ParameterScore
 from studies.concealed_effects.summary import NOTHING, Bin
-from workbench.view.figures.style import ACCENT, COMMAND, RECORDED, SIMULATED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, RECORDED, SIMULATED, in_house_style, legend_above, new_figure
 
 LAST = ("abstained", "failed")
 """Columns that stand behind all names."""
@@ -19,7 +19,7 @@ WIDEST = 1.0
 """Relative error at which the figure of sizes ends."""
 
 
-@styled
+@in_house_style
 def confusion_figure(counts: Counter[tuple[str, str]]) -> Figure:
     """Confusion matrix: true effects down, named effects across; on the diagonal its own name, alone or in a tie."""
     rows = sorted({t for t, _ in counts} - {NOTHING}) + [NOTHING] * any(t == NOTHING for t, _ in counts)
@@ -47,7 +47,7 @@ def confusion_figure(counts: Counter[tuple[str, str]]) -> Figure:
     return figure
 
 
-@styled
+@in_house_style
 def reliability_figure(bins: Sequence[Bin]) -> Figure:
     """How often findings are true against how sure they are; bars are 95 % intervals, the diagonal is a calibrated diagnosis."""
     figure = new_figure(6.2, 5.6)
@@ -70,7 +70,7 @@ def reliability_figure(bins: Sequence[Bin]) -> Figure:
     return figure
 
 
-@styled
+@in_house_style
 def sizes_figure(sizes: Sequence[ParameterScore]) -> Figure:
     """Each size that was given: relative error, and its 90 % interval about the truth at 0; beyond the edge an arrow."""
     names = sorted({p.effect for p in sizes}, reverse=True)
@@ -96,7 +96,7 @@ def sizes_figure(sizes: Sequence[ParameterScore]) -> Figure:
     return figure
 
 
-@styled
+@in_house_style
 def time_figure(seconds: Sequence[float], memory: Sequence[float]) -> Figure:
     """How long a diagnosis took [s], and the most memory that it held [bytes]."""
     figure = new_figure(9.0, 3.4)

@@ -86,7 +86,7 @@ def servo_yaml(model: RobotModel) -> str:
     kinds = {model.servo(j) for j in model.joints}
     if len(kinds) != 1:
         raise ValueError("expected one kind of servo for all joints")
-    return yaml.safe_dump(kinds.pop().written(), sort_keys=False)
+    return yaml.safe_dump(kinds.pop().as_dict(), sort_keys=False)
 
 
 def make_session(out: Path, model: RobotModel, walk: MotionRows, seed: int, gaps: float = 0.3) -> None:

@@ -19,7 +19,7 @@ COLOURS = {"nominal": style.SIMULATED, "delay and gain": style.FLOOR, "read off"
            **dict(zip((p.name for p in PUBLISHED), style.OTHERS[1:]))}
 
 
-@style.styled
+@style.in_house_style
 def draw_loops(slow: Programme, nominal: Array, unit: Array) -> Figure:
     """Error against goal of each joint in a slow programme, recorded and nominal."""
     figure = style.new_figure(12, 6.5)
@@ -36,7 +36,7 @@ def draw_loops(slow: Programme, nominal: Array, unit: Array) -> Figure:
     return figure
 
 
-@style.styled
+@style.in_house_style
 def draw_current(rows: Sequence[Rows], laws: Sequence[Current]) -> Figure:
     """The register of joints that stand against their error, and the parabolas."""
     figure = style.new_figure(9, 4.5)
@@ -55,7 +55,7 @@ def draw_current(rows: Sequence[Rows], laws: Sequence[Current]) -> Figure:
     return figure
 
 
-@style.styled
+@style.in_house_style
 def draw_overlay(p: Programme, paths: Mapping[str, Array], unit: Array, span: tuple[float, float]) -> Figure:
     """Goal, recording and models of one programme over a stretch of time [s]."""
     figure, panels = style.panels(len(JOINTS), 2, 13, 2.3)
@@ -72,7 +72,7 @@ def draw_overlay(p: Programme, paths: Mapping[str, Array], unit: Array, span: tu
     return figure
 
 
-@style.styled
+@style.in_house_style
 def draw_errors(by_model: Mapping[str, Array]) -> Figure:
     """RMS error of each joint (6,) [deg] on validation programmes, model by model."""
     figure = style.new_figure(10, 4)

@@ -117,4 +117,4 @@ def servo(jaw_range: float | None = None) -> ServoConstants:
 
 def servo_yaml(constants: ServoConstants) -> str:
     """servo.yaml (docs/formats.md, section 4)."""
-    return yaml_text(constants.written())
+    return yaml_text(constants.as_dict())

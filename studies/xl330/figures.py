@@ -17,7 +17,7 @@ SLOW = 1.0
 """[rad/s] below which the arm's weight and the motor's torque nearly balance, but for friction."""
 
 
-@style.styled
+@style.in_house_style
 def draw_balance(logs: Sequence[Log], stall_torque: float) -> Figure:
     """The arm's weight over the motor's duty, wherever the arm is slow and the torque on: going up, down, or held."""
     figure = style.new_figure(10, 5.5)
@@ -44,7 +44,7 @@ def draw_balance(logs: Sequence[Log], stall_torque: float) -> Figure:
     return figure
 
 
-@style.styled
+@style.in_house_style
 def draw_logs(models: Mapping[str, Mapping[str, Played]], title: str) -> Figure:
     """Recorded angles and models', by model and log; a panel for each log."""
     logs = next(iter(models.values()))

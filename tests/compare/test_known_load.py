@@ -23,7 +23,7 @@ SERVO = ServoConstants(compliance_slope=None, compliance_margin=None, punch=None
 
 def session(folder, **takes):
     (folder / "rig.sdf").write_text(SDF.format(length=0.1, mass=0.2))
-    (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO.written()))
+    (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO.as_dict()))
     time = np.arange(0.0, 1.0, 0.01)
     write_joint_log(folder / "log.csv", time, {"goal.j": 0 * time + 0.5, "position.j": 0 * time})
     entries = [{"name": name, "recording": "log.csv", "base": "fixed"} | more for name, more in takes.items()]

@@ -61,13 +61,13 @@ def test_heading_counts_turns_and_ignores_tilt():
     rolled = Rotation.from_euler("ZYX", np.column_stack([yaw, 0.2 * np.sin(yaw), 0.3 * np.cos(yaw)]))
     quat = rolled.as_quat(scalar_first=True) * np.where(np.arange(400) % 2, 1, -1)[:, None]
     np.testing.assert_allclose(metrics.heading(quat), yaw, atol=1e-9)
-    assert metrics.turned(quat, np.linspace(-1, 3, 400)) == pytest.approx(yaw[-1] - yaw[:100].mean(), abs=1e-9)
+    assert metrics.heading_change(quat, np.linspace(-1, 3, 400)) == pytest.approx(yaw[-1] - yaw[:100].mean(), abs=1e-9)
 
 
 def test_travelled_is_from_rest_to_the_last_frame_seen():
     p = np.column_stack([np.clip(TIME - 1, 0, None) * 0.1, 0 * TIME, 0 * TIME + 0.2])
     p[-5:] = np.nan
-    np.testing.assert_allclose(metrics.travelled(p, TIME - 1), [0.1 * (TIME[-6] - 1), 0, 0], atol=1e-12)
+    np.testing.assert_allclose(metrics.displacement(p, TIME - 1), [0.1 * (TIME[-6] - 1), 0, 0], atol=1e-12)
 
 
 def test_speed_of_a_circle():

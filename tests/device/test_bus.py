@@ -93,6 +93,26 @@ def test_two_servos_with_one_id_are_told():
         assert any(p.startswith("servo 7: two servos seem to have this ID") for p in survey(bus, r.model, ids=()).problems())
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_two_servos_with_one_id_cost_no_other_its_answer(family):
+    """One of the two may still answer when the other has been heard, and would garble the next question."""
+    r = robot(family, joints=["flm", "frm"])
+    VirtualServo(r.wire, FAMILIES[family][0], BUS_IDS["flm"], r.body, seed=9)["return_delay_time"] = 20
+    bus = r.bus(options=BusOptions(tries=1))
+    frm, broken = BUS_IDS["frm"], 0
+    for _ in range(100):
+        try:
+            bus.read(FLM, "torque_enable", "present_position")
+        except NoAnswerError:
+            broken += 1
+            assert bus.read(frm, "present_position")["present_position"] > 0
+        if bus.group_kind and not bus.read_all([FLM], "torque_enable", "present_position"):
+            broken += 1
+            assert bus.read(frm, "present_position")["present_position"] > 0
+        bus.pause(0.00137)
+    assert broken > 50
+
+
 def test_another_rate_is_found_and_said():
     r = robot()
     for servo in r.servos.values():

@@ -15,8 +15,7 @@ from tests.device.whole_loop import of_an_arm
 from workbench.api.robot_run import run_on_robot
 from workbench.compare.session import load_session
 from workbench.compare.session_file import write_session
-from workbench.device.capture import Recorder, UdpLink
-from workbench.device.capture.background import BackgroundRecording
+from workbench.device.capture import BackgroundRecording, Recorder, UdpLink
 from workbench.device.play import PlayOptions
 from workbench.files import InputError
 from workbench.recording.formats.read import read_recording

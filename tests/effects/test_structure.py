@@ -531,7 +531,7 @@ def test_backlash_explains_another_engines_recording_of_it():
     for model in (stand.model, with_effects(stand.model, ("backlash", "flm", {"gap": 3.0}))):
         rollout = Simulation(model, replace(FIXED, contact_period=0.0)).run(stand.commands, duration=4.0, lead=0.3)
         take = register_take(stand, rollout, None)
-        apart = (take.recorded.q - take.observed(rollout, model).q[:, [model.joints.index(j) for j in take.recorded.joints]])
+        apart = (take.recorded.q - take.observe(rollout, model).q[:, [model.joints.index(j) for j in take.recorded.joints]])
         moving = np.isfinite(apart).all(axis=1) & (take.recorded.time > take.measurement.starts_at)
         errors.append(np.rad2deg(np.sqrt(np.mean(apart[moving, take.recorded.column("flm")] ** 2))))
     assert errors[0] > 1.0

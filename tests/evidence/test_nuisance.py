@@ -36,7 +36,7 @@ def test_a_number_may_say_how_well_it_is_known(tmp_path):
     assert servo.share_known("supply_voltage") == pytest.approx(0.05)
     assert servo.share_known("coulomb_friction") == SHARES_KNOWN["coulomb_friction"]
     path = tmp_path / "again.yaml"
-    path.write_text(yaml.safe_dump(servo.written()))
+    path.write_text(yaml.safe_dump(servo.as_dict()))
     assert load_servo_constants(path) == servo
 
 

@@ -79,7 +79,7 @@ def test_what_the_data_do_not_tell_is_widened_no_further_than_before():
     ({"names": ["zero"], "rows": ["one"]}, "rows: expected lists of numbers"),
     (3.0, "expected {names: [...], rows: [[...], ...]}")])
 def test_what_is_no_covariance_is_refused(tmp_path, content, said):
-    servo = {k: v for k, v in ServoConstants().written().items() if v is not None} | {"covariance": content}
+    servo = {k: v for k, v in ServoConstants().as_dict().items() if v is not None} | {"covariance": content}
     with pytest.raises(InputError) as e:
         servo_constants(servo, tmp_path / "servo.yaml")
     assert said in str(e.value)

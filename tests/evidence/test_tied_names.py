@@ -72,7 +72,7 @@ def test_variation_between_days_is_not_reported():
 
 def test_a_known_weight_in_some_takes_leaves_torque_as_the_only_cause():
     here, fit, fits = found(math.log(0.6), 0.5, loaded=0.5)
-    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
+    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits, weighed=True)
     assert tied.torque_behind == 0.0
     assert min(n.behind for n in tied.names) > OPTIONS.occam
     assert tied.competitive == ()
@@ -123,20 +123,33 @@ def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
     assert [n["effect"] for n in tie.to_json()["names"]] == ["payload", "parallel_spring"]
 
 
-def test_names_that_turn_gravity_and_leave_its_size_share_their_probability():
-    names = [candidate(name) for name in ("ground_tilt", "parallel_spring")]
-    here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.06),))
-    torque, turned = np.random.default_rng(3).normal(size=(2, 1600)) * 0.1
-    does = {"torque_at_full_duty": torque} | {f"{c.name}.{c.parameters[0].name}": SHIFT * turned for c in names}
+def turned_by(names, alike):
+    """The tie of a rig on which gravity is turned, and which is explained by the first of `names`; `alike`: those that all do
+    the same."""
+    pool = [candidate(name) for name in names]
+    here = replace(region(pool), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.06),))
+    torque, turned, other = np.random.default_rng(3).normal(size=(3, 1600)) * 0.1
+    does = {"torque_at_full_duty": torque} | {f"{c.name}.{c.parameters[0].name}": SHIFT * (turned if c.name in alike else other)
+                                              for c in pool}
     rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=4.0 * SHIFT * turned, does=does)
     plain = start(here.numbers)
     bare = lockstep(rig, {0: fitting(here, OPTIONS, plain, 0.1, 9)})[0]
     assert lockstep(rig, {0: fits_of_tie(here, OPTIONS, bare)})[0] is None
-    tilted = plain.with_effect(names[0], np.ones(names[0].size))
-    fit = lockstep(rig, {0: fitting(here, OPTIONS, tilted, 0.1, 9)})[0]
+    fit = lockstep(rig, {0: fitting(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
     ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
-    told = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), ties)
-    assert {n.effect for n in told.competitive} == {"ground_tilt", "parallel_spring"}
+    return gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), ties)
+
+
+@pytest.mark.parametrize("names", [("ground_tilt", "parallel_spring"), ("ground_tilt", "zero_offset"),
+                                   ("zero_offset", "ground_tilt")])
+def test_names_that_turn_gravity_and_leave_its_size_share_their_probability(names):
+    told = turned_by(names, alike=names)
+    assert {n.effect for n in told.competitive} == set(names)
     assert told.confidence > 0.9
     assert not told.may_be_torque
     assert "while gravity over torque is 1.00" in told.change
+
+
+def test_a_turned_servo_that_is_told_from_a_tilt_is_no_tie():
+    assert turned_by(("zero_offset", "ground_tilt"), alike=("zero_offset",)) is None
+    assert turned_by(("ground_tilt", "zero_offset"), alike=("ground_tilt",)).competitive[0].effect == "ground_tilt"

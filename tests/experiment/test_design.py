@@ -119,10 +119,10 @@ def test_only_what_differs_adapts(arm):
     assert pair.names == ("servo_gain", "payload")
     assert len(pair.neighbours) == 1 + 4
     assert pair.a.freedom == pytest.approx([0.25]), "half of the missing gain"
-    moved = pair.b.moved(np.array([1.0, 0, 0, -1.0]))
+    moved = pair.b.move(np.array([1.0, 0, 0, -1.0]))
     assert moved.model.effects[0].parameters["mass"] == pytest.approx(0.15)
     assert moved.model.effects[1] == shared
-    assert pair.a.moved(np.array([-100.0])).model.effects[1].parameters["ratio"] == 0.05, "as far as is possible"
+    assert pair.a.move(np.array([-100.0])).model.effects[1].parameters["ratio"] == 0.05, "as far as is possible"
 
 
 def test_a_flatter_law_and_a_softer_joint_are_told_apart(arm, tmp_path):

@@ -10,7 +10,8 @@ import pytest
 
 from workbench.files import InputError
 from workbench.gait.drive.controller import CycleController, limited
-from workbench.gait.drive.observer import BIAS, GAIN, P11, PLAYED, first_state, observed
+from workbench.gait.drive.family import STRAIGHT, Steer
+from workbench.gait.drive.observer import ASIDE, BIAS, GAIN, P11, PLAYED, PLAYED_SIDE, first_state, observed
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, corridor, plan
@@ -20,6 +21,7 @@ from workbench.robot import puppy_model
 from workbench.view.scene.drive import DriveScene
 
 MAP = StepMap(bias=0.0, gain=1.0, memory=0.4, ahead=0.12, aside=0.0, aside_gain=0.03, scatter=(0.01, 0.001), most=0.15)
+SIDEWAYS = replace(MAP, side_gain=1.5, side_turns=1.0)
 PERIOD = 0.4
 
 
@@ -52,33 +54,38 @@ def test_increments_are_in_the_frame_at_each_beginning() -> None:
 
 
 def test_without_binding_limits_the_plan_is_the_least_squares_solution() -> None:
-    """The programme written out as one linear least-squares problem in the turns, solved by the normal equations."""
-    o, N = DriveOptions(most=10.0, most_change=10.0), 4
+    """The programme written out as one linear least-squares problem in turns and sideways strides, by the normal equations."""
+    o, N, m = DriveOptions(most=10.0, most_change=10.0, most_side=10.0, most_side_change=10.0), 4, SIDEWAYS
     left, heading, before, bias = 0.05, 0.1, 0.02, 0.03
     targets = np.array([0.0, 0.05, 0.1, 0.1, 0.1])
 
-    def rolled(u: np.ndarray) -> np.ndarray:
-        y, e, last, rows = left, heading - targets[0], before, []
-        for j, bend in enumerate(np.diff(targets)):
-            rows += [y / o.aside, e / o.turned, (u[j] - last) / o.change]
-            turned = MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - bend
-            y, e = y + MAP.ahead * (e - bend / 2) + MAP.aside + MAP.aside_gain * u[j], e + turned
-            last = u[j]
+    def rolled(w: np.ndarray) -> np.ndarray:
+        y, e, last, last_side, rows = left, heading - targets[0], before, 0.001, []
+        for u, v, bend in zip(w[:N], w[N:], np.diff(targets)):
+            rows += [y / o.aside, e / o.turned, (u - last) / o.change, (v - last_side) / o.side_change]
+            turned = m.bias + bias + m.gain * u + m.memory * last + m.side_turns * v - bend
+            y, e = y + m.ahead * (e - bend / 2) + m.aside + m.aside_gain * u + m.side_gain * v, e + turned
+            last, last_side = u, v
         return np.array([*rows, y / o.aside, e / o.turned])
 
-    base = rolled(np.zeros(N))
-    J = np.column_stack([rolled(np.eye(N)[j]) - base for j in range(N)])
+    base = rolled(np.zeros(2 * N))
+    J = np.column_stack([rolled(np.eye(2 * N)[j]) - base for j in range(2 * N)])
     best = -np.linalg.solve(J.T @ J, J.T @ base)
-    assert plan(left, heading, before, bias, targets, MAP, o).turns == pytest.approx(best, abs=1e-5)
+    planned = plan(left, heading, Steer(before, 0.001), bias, targets, m, o)
+    assert planned.turns == pytest.approx(best[:N], abs=1e-5)
+    assert planned.sides == pytest.approx(best[N:], abs=1e-6)
 
 
 def test_the_plan_keeps_its_limits_where_they_bind() -> None:
     o = DriveOptions()
-    u = plan(0.5, 1.0, 0.0, 0.1, np.zeros(o.horizon + 1), MAP, o).turns
+    planned = plan(0.5, 1.0, STRAIGHT, 0.1, np.zeros(o.horizon + 1), SIDEWAYS, o)
+    u, v = planned.turns, planned.sides
+    assert np.abs(v).max() <= o.most_side + 1e-7
+    assert np.diff(v, prepend=0.0)[0] == pytest.approx(-o.most_side_change, abs=1e-6)
     assert np.abs(u).max() <= o.most + 1e-6
     assert np.abs(np.diff(np.concatenate([[0.0], u]))).max() <= o.most_change + 1e-6
     assert u[0] == pytest.approx(-o.most_change, abs=1e-5)
-    assert limited(-1.0, 0.1, o) == pytest.approx(0.1 - o.most_change)
+    assert limited(Steer(-1.0, -1.0), Steer(0.1, 0.002), o) == Steer(0.1 - o.most_change, 0.002 - o.most_side_change)
 
 
 def test_a_disc_is_passed_on_its_free_side_and_a_robot_inside_one_gets_out() -> None:
@@ -87,9 +94,9 @@ def test_a_disc_is_passed_on_its_free_side_and_a_robot_inside_one_gets_out() -> 
     low, high = corridor(path, along, 0.0, [Disc(0.8, -0.05, 0.08)], o.clearance)
     assert np.isinf(high).all()
     assert low.max() == pytest.approx(0.15, abs=0.01)
-    planned = plan(0.0, 0.0, 0.0, 0.0, np.zeros(o.horizon + 1), MAP, o, (low, high))
+    planned = plan(0.0, 0.0, STRAIGHT, 0.0, np.zeros(o.horizon + 1), MAP, o, (low, high))
     assert (planned.left - low).min() > -0.005
-    inside = plan(0.0, 0.0, 0.0, 0.0, np.zeros(o.horizon + 1), MAP, o, (np.full(o.horizon + 1, 0.1), high))
+    inside = plan(0.0, 0.0, STRAIGHT, 0.0, np.zeros(o.horizon + 1), MAP, o, (np.full(o.horizon + 1, 0.1), high))
     assert inside.turns[0] == pytest.approx(o.most_change, abs=1e-4)
     assert inside.left[-1] > 0.09
 
@@ -108,6 +115,26 @@ def test_a_robot_that_turns_by_itself_is_brought_onto_the_line(law: str, bias: f
     driven = _drive(DriveOptions(law=law), bias, lost=0.1)  # type: ignore[arg-type]
     assert abs(driven[-1, 1]) < 0.03
     assert abs(driven[-1, 2]) < np.radians(4.0)
+
+
+@pytest.mark.parametrize("law", ["mpc", "proportional"])
+def test_a_robot_that_walks_aside_keeps_the_line_and_its_heading(law: str) -> None:
+    """By a sideways stride against it, where the gait has one; else its heading is off by as much as it walks aside."""
+    aside = 0.008
+    turned_only, sideways = (_drive(DriveOptions(law=law), 0.02, lost=0.1, aside=aside, m=m)  # type: ignore[arg-type]
+                             for m in (MAP, SIDEWAYS))
+    assert np.abs(sideways[20:, 1]).max() < 0.03
+    assert np.mean(turned_only[20:, 2]) == pytest.approx(-aside / MAP.ahead, abs=0.015)
+    assert abs(np.mean(sideways[20:, 2])) < 0.015
+
+
+def test_the_observer_takes_no_sideways_stride_for_the_robots_own() -> None:
+    x, y = first_state(SIDEWAYS, DriveOptions()), 0.0
+    for _ in range(40):
+        x[PLAYED_SIDE] = 0.004
+        y += SIDEWAYS.side_gain * 0.004 - 0.002
+        x = observed(x, np.array([0.0, y, 0.0]), 0.0, replace(SIDEWAYS, side_turns=0.0), DriveOptions())
+    assert x[ASIDE] == pytest.approx(-0.002, abs=1e-4)
 
 
 def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
@@ -138,7 +165,7 @@ def test_on_an_arc_that_the_map_follows_exactly_there_is_nothing_to_correct() ->
     """A cycle that turns evenly moves aside by half of ahead times its turn, and so does the arc."""
     m, bend = replace(MAP, memory=0.0, gain=1.0, aside_gain=MAP.ahead / 2), 0.06
     o = DriveOptions()
-    planned = plan(0.0, 0.0, bend, 0.0, bend * np.arange(o.horizon + 1), m, o)
+    planned = plan(0.0, 0.0, Steer(bend), 0.0, bend * np.arange(o.horizon + 1), m, o)
     assert planned.turns == pytest.approx(np.full(o.horizon, bend), abs=1e-6)
     assert planned.left == pytest.approx(np.zeros(o.horizon + 1), abs=1e-7)
 
@@ -161,20 +188,21 @@ def test_a_robot_that_the_cameras_lost_is_stopped() -> None:
     assert stops == [0, 0, 1, 1]
 
 
-def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40, discs: Sequence[Disc] = ()) -> np.ndarray:
-    """A robot that obeys MAP, plus its own bias and the map's scatter. Poses (cycles, 3)."""
+def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40, discs: Sequence[Disc] = (), aside: float = 0.0,
+           m: StepMap = MAP) -> np.ndarray:
+    """A robot that obeys the map, plus its own bias, way aside and the map's scatter. Poses (cycles, 3)."""
     rng = np.random.default_rng(3)
-    controller = CycleController(WayPath([(10.0, 0.0)]), MAP, PERIOD, options, discs)
+    controller = CycleController(WayPath([(10.0, 0.0)]), m, PERIOD, options, discs)
     context = controller.CreateDefaultContext()
-    pose, played, committed, poses = np.zeros(3), 0.0, 0.0, []
+    pose, played, committed, poses = np.zeros(3), STRAIGHT, STRAIGHT, []
     for _ in range(cycles):
         seen = np.full(3, np.nan) if rng.random() < lost else pose + rng.normal(size=3) * [1e-4, 1e-4, 0.002]
         controller.GetInputPort("pose").FixValue(context, seen)
         context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
-        after = float(controller.GetOutputPort("turn").Eval(context)[0])
-        turned = MAP.turned(committed, played) + bias + rng.normal() * MAP.scatter[0]
-        c, s, side = np.cos(pose[2]), np.sin(pose[2]), MAP.aside_gain * committed
-        pose = pose + np.array([MAP.ahead * c - side * s, MAP.ahead * s + side * c, turned])
+        after = Steer(*(float(controller.GetOutputPort(name).Eval(context)[0]) for name in ("turn", "side")))
+        turned = m.turned(committed, played.turn) + bias + rng.normal() * m.scatter[0]
+        c, s, side = np.cos(pose[2]), np.sin(pose[2]), aside + m.moved_aside(committed)
+        pose = pose + np.array([m.ahead * c - side * s, m.ahead * s + side * c, turned])
         played, committed = committed, after
         poses.append(pose)
     return np.array(poses)

@@ -15,7 +15,7 @@ from workbench.files import InputError
 from workbench.gait.drive.certify import (
     FILE,
     FamilyOptions,
-    bounded_turns,
+    bounded_steers,
     broken_limits,
     certify_family,
     gait_sha256,
@@ -37,10 +37,9 @@ def gait(tmp_path: Path) -> Path:
 
 def test_turns_meet_their_limits_and_stay_within() -> None:
     o = FamilyOptions(cycles=200)
-    turns = bounded_turns(np.random.default_rng(0), o)
-    changes = np.diff(turns)
-    assert np.abs(turns).max() == pytest.approx(o.most)
-    assert np.abs(changes).max() == pytest.approx(o.most_change)
+    steers = np.array([[u.turn, u.side] for u in bounded_steers(np.random.default_rng(0), o)])
+    assert np.abs(steers).max(axis=0) == pytest.approx([o.most, o.most_side])
+    assert np.abs(np.diff(steers, axis=0)).max(axis=0) == pytest.approx([o.most_change, o.most_side_change])
 
 
 def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(gait: Path, tmp_path: Path) -> None:
@@ -56,7 +55,8 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
     certificate.write(tmp_path)
     read = read_family(gait, model)
     assert read.step_map == certificate.step_map
-    assert read.limits == {"most": 0.15, "most_change": 0.08}
+    assert read.limits == {"most": 0.15, "most_change": 0.08, "most_side": 0.008, "most_side_change": 0.003}
+    assert 1.0 < certificate.step_map.side_gain < 2.0, "a stride to the side is that of a stance, not of a cycle"
     content = json.loads((tmp_path / FILE).read_text())
     (tmp_path / FILE).write_text(json.dumps({**content, "most": 0.5}))
     with pytest.raises(InputError, match="changed"):

@@ -24,7 +24,7 @@ from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
 from workbench.gait.drive.controller import CycleController
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import GaitFamily, Steer, load_family
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.step_map import StepMap
@@ -40,19 +40,22 @@ def family(model: RobotModel) -> GaitFamily:
 
 
 @needs_compiler
-def test_every_change_of_turn_that_the_plan_allows_is_within_the_programs_reach() -> None:
+def test_every_change_that_the_plan_allows_is_within_the_programs_reach() -> None:
     """By the firmware's own check. It would refuse most poses of a swing, where servos are led by more than they can follow."""
     model, options = puppy_model(), DriveOptions()
     gaits, reach = family(model), core().table_reachable
     reach.restype = ctypes.c_bool
     turns = np.arange(-options.most, options.most + 1e-9, options.most / 3)
-    pairs = [(u, v) for u in turns for v in turns if abs(u - v) <= options.most_change]
+    sides = np.arange(-options.most_side, options.most_side + 1e-9, options.most_side / 2)
+    steers = [Steer(float(u), float(s)) for u in turns for s in sides]
+    change, side_change = options.most_change + 1e-9, options.most_side_change + 1e-9
+    pairs = [(a, b) for a in steers for b in steers if abs(a.turn - b.turn) <= change and abs(a.side - b.side) <= side_change]
     for before, turn in pairs:
         last = table_file(gaits.cycle(before), model).table.goals[-1]
         goals = (ctypes.c_uint16 * len(last))(*last.tolist())
         assert reach(encode_table(table_file(gaits.cycle(turn, before), model, 4, True)), goals), (before, turn)
         assert reach(encode_table(table_file(gaits.stop(before), model, 1, True)), goals)
-    cycle = gaits.cycle(0.0)
+    cycle = gaits.cycle()
     swing = [np.roll(np.arange(len(cycle)), -k) for k in range(len(cycle))]
     rolled = [replace(cycle, goals=cycle.goals[k], speeds=cycle.speeds[k], dwells_ms=cycle.dwells_ms[k]) for k in swing]
     ways = [np.abs(t.goals[0] - t.goals[-1]).max() for t in rolled]
@@ -171,3 +174,10 @@ def test_options_that_do_not_fit_are_one_line(arguments: list[str], said: str, c
     assert main(["drive", "1,0", "--gait", str(GAIT), "--out", str(tmp_path / "out"), *arguments]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--seed", "--draw"])
+def test_a_seed_below_zero_is_one_line(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["drive", "1,0", "--gait", str(GAIT), option, "-1"])
+    assert f"{option}: expected a whole number of at least 0" in capsys.readouterr().err

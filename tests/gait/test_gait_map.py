@@ -14,9 +14,9 @@ from workbench.gait.ensemble import Ensemble
 from workbench.gait.gait_map import Cell, GaitMap, MapOptions, build_map, load_map
 from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
-from workbench.robot import EffectSpec, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 
-SMALL = MapOptions(cells=3, generations=1, batch=4, robots=1, fresh=1, seconds=0.5)
+SMALL = MapOptions(cells=3, generations=1, batch=4, robots=1, measured=1, fresh=1, seconds=0.5)
 
 
 def of(*cells: Cell) -> GaitMap:
@@ -57,6 +57,18 @@ def test_a_file_that_is_no_map_is_one_line(tmp_path: Path, capsys: pytest.Captur
     assert main(["optimize", "--map", str(tmp_path / "map.json"), "--out", str(tmp_path / "out")]) == 2
     assert "not a map of gaits" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_map_that_ships_is_of_the_puppy_and_holds_gaits_that_are_reproduced() -> None:
+    found = load_map(data_file("gaits/map.json"), puppy_model())
+    assert found.filled > 0.6
+    assert found.reproduced > 0.9
+    assert found.start_for(Request(speed=0.2)).stride > found.start_for(Request(speed=0.05)).stride
+
+
+def test_a_map_with_a_method_that_does_not_search_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["optimize", "--map", "--method", "plan", "--out", str(tmp_path / "out")]) == 2
+    assert "--map with --method plan" in capsys.readouterr().err
 
 
 @pytest.mark.slow

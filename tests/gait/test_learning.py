@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from workbench.files import InputError
-from workbench.gait.drive.family import GaitFamily, load_family
+from workbench.gait.drive.family import STRAIGHT, GaitFamily, Steer, load_family
 from workbench.gait.drive.walk import SimulatedWalk
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.learning.actions import Actions, CycleActions, PoseActions
@@ -67,7 +67,7 @@ def test_an_episode_of_turns_is_the_walk_that_drive_plays(family: GaitFamily) ->
     walk.begin()
     for turn in (0.05, 0.1, 0.0):
         episode.step(np.array([turn / options.turn, 0.0]))
-        pose = walk.cycle(turn, 0.0).pose
+        pose = walk.cycle(Steer(turn), STRAIGHT).pose
     assert episode.over
     np.testing.assert_allclose(episode.take().p_WB[-1, :2], pose[:2], atol=1e-3)
 

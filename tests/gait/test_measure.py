@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.files import InputError
+from workbench.gait.evaluate import SEARCH
 from workbench.gait.limits import GaitLimits, binding, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import fallen, measure
@@ -17,9 +18,9 @@ from workbench.robot import puppy_model
 MODEL = puppy_model()
 
 
-def take_of(speed=0.2, turning=0.0, seconds=4.0, tilt=0.0, torque=0.3) -> Take:
+def take_of(speed=0.2, turning=0.0, seconds=4.0, tilt=0.0, torque=0.3, every=0.01) -> Take:
     """A body that glides on a circle at a constant speed, its joints at rest under a torque."""
-    t = np.arange(-0.1, seconds + 1e-9, 0.01)
+    t = np.arange(-0.1, seconds + 1e-9, every)
     on = np.maximum(t, 0)
     h = turning * on
     p = np.column_stack([np.sin(h) / turning * speed if turning else speed * on,
@@ -40,6 +41,17 @@ def test_speed_turn_and_torque_of_a_glide():
     assert m.jerk < 0.2
     assert m.power == pytest.approx(16 * 0.05 * 11.1)  # no duty: what servos and controller take at rest
     assert m.drift == pytest.approx(0.5 * 3.5)
+
+
+@pytest.mark.parametrize(("rows", "counts"), [(1, False), (2, False), (3, True)])
+def test_a_torque_counts_from_ten_milliseconds_on(rows, counts):
+    """Of rollouts as searches and certificates log them: an impulse in one row or two is none that a servo has to hold."""
+    take = take_of(every=SEARCH.log_period)
+    torque = take.torque.copy()
+    torque[500:500 + rows, 3] = 1.2
+    m = measure(replace(take, torque=torque), MODEL, 0.5, 0.5)
+    assert (max(m.peak) == pytest.approx(1.2)) is counts
+    assert (m.torque_use[3] > 2 * m.torque_use[4]) is counts
 
 
 def test_a_tilted_or_sunken_body_fell():

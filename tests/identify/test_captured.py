@@ -26,7 +26,7 @@ def take(request: pytest.FixtureRequest) -> TakeEvidence:
 def both(e: TakeEvidence, model: RobotModel, until: float = np.inf) -> tuple[np.ndarray, np.ndarray | None]:
     """The reference's channels, and those of the compiled pass."""
     rollout = rollout_of(e, model, until)
-    return e.simulated(run_job(rollout.job), model), seen_channels(rollout)
+    return e.observe(run_job(rollout.job), model), seen_channels(rollout)
 
 
 EFFECTS = {

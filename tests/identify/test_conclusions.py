@@ -7,7 +7,7 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
-from workbench.identify.conclusions import estimates, finding, rejected, unexplained, verdict_of
+from workbench.identify.conclusions import estimates, finding, list_rejected, list_unexplained, verdict_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
@@ -65,7 +65,7 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     assert told.where == ("thigh", "shank")
     assert told.confidence == pytest.approx(0.75)
     assert [(a.effect, a.where) for a in told.alternatives] == [("zero_offset", ("knee",))]
-    lost = {(r.effect, r.where) for r in rejected(SEEN, fit, (), [standing], FRAME)}
+    lost = {(r.effect, r.where) for r in list_rejected(SEEN, fit, (), [standing], FRAME)}
     assert lost == {("zero_offset", ("knee",)), ("link_length", ("hip",))}
 
 
@@ -103,7 +103,7 @@ def test_what_stays_beyond_noise_and_floor_on_unseen_stretches_is_unexplained(wo
     residual = np.random.default_rng(0).normal(size=e.recorded.shape)
     residual[:, e.channels.index("three")] *= size
     floors = {0: np.where(np.array(e.channels) == "three", floor, 0.0)}
-    assert tuple(j for u in unexplained([e], {0: residual}, floors) for j in u.where) == left
+    assert tuple(j for u in list_unexplained([e], {0: residual}, floors) for j in u.where) == left
 
 
 @pytest.mark.parametrize("goes_with", ["angle", "speed", None])
@@ -114,6 +114,6 @@ def test_what_is_left_says_which_signal_it_goes_with(worn, goes_with):
     signal = {"angle": angle, "speed": np.gradient(angle, e.take.recorded.time), None: random.normal(size=len(angle))}[goes_with]
     residual = random.normal(size=e.recorded.shape)
     residual[:, e.channels.index("three")] += 4.0 * (signal - np.nanmean(signal)) / np.nanstd(signal)
-    (said,) = unexplained([e], {0: residual}, {})
+    (said,) = list_unexplained([e], {0: residual}, {})
     assert said.where == ("three",)
     assert said.description.signal == goes_with

@@ -35,7 +35,7 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     def played(torque):
         unit = friction.values(np.ones(1))[0] - friction.neutral[0]
         model = with_effects(session.model, [(friction, np.array([(torque - friction.neutral[0]) / unit]))])
-        return e.simulated(run_job(search.evaluator.job(model, 0, CONFIG)), model)
+        return e.observe(run_job(search.evaluator.job(model, 0, CONFIG)), model)
 
     late = np.clip(e.since / e.since[-1], 0.0, 1.0)[:, None]
     noise = np.random.default_rng(1).normal(size=e.recorded.shape) * e.sigma
@@ -45,7 +45,7 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     assert drift.effect == friction
     assert drift.first == pytest.approx(0.3, abs=0.05)
     assert drift.last == pytest.approx(0.1, abs=0.05)
-    left = drift.left([fading])
+    left = drift.as_unexplained([fading])
     assert left.where == ("three",)
     assert left.unit == "deg"
     assert left.error > 5 * left.floor > 0.0

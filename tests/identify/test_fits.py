@@ -107,7 +107,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     best = max(trials, key=lambda t: t.gain["choose"])
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)
-    refined = search.refined(search.refit(search.evaluate([(best.candidate, best.x)]), (0,), 2))
+    refined = search.refine(search.refit(search.evaluate([(best.candidate, best.x)]), (0,), 2))
     noise = np.count_nonzero(search.evaluator.vector(nominal.residuals, "validate"))
     assert refined.cost["validate"] - noise < 0.2 * (nominal.cost["validate"] - noise)
     (sd,) = np.sqrt(np.diag(refined.covariance))

@@ -59,7 +59,7 @@ def seen(evidence, monkeypatch, ill=(), model=None):
 
 def test_what_is_as_drawn_is_not_asked_about_and_what_cameras_do_not_see_is(monkeypatch):
     build = seen(filmed(puppy_model().kinematics), monkeypatch)
-    left = {c.key for c in build.asked(pool())}
+    left = {c.key for c in build.select_untried(pool())}
     assert left == {("link_length", ("flb_link",)), ("zero_offset", ("flb",)), ("backlash", ("flm",))}
     assert build.measured == ()
     assert build.added_to(puppy_model()) == puppy_model()
@@ -74,7 +74,7 @@ def test_a_longer_thigh_and_a_turned_hip_are_measured(monkeypatch):
     assert length.mean == pytest.approx(0.004, abs=3 * length.sigma)
     assert length.sigma < 4e-4
     assert zero.mean == pytest.approx(-5.0, abs=3 * zero.sigma)
-    assert {c.where for c in build.asked(pool()) if c.name != "backlash"} == {("flb_link",), ("flb",)}
+    assert {c.where for c in build.select_untried(pool()) if c.name != "backlash"} == {("flb_link",), ("flb",)}
     with_them = build.added_to(puppy_model())
     assert [(e.effect, e.where) for e in with_them.effects] == [("link_length", ("flm_link",)), ("zero_offset", ("frm",))]
     error = Change(2.0, 1.0, "deg")
@@ -88,7 +88,7 @@ def test_a_longer_thigh_and_a_turned_hip_are_measured(monkeypatch):
 def test_a_zero_is_fitted_where_droop_may_not_be_the_models(monkeypatch):
     build = seen(filmed(puppy_model().kinematics, {"frm": -5.0}), monkeypatch, ill=("frt",))
     assert build.measured == ()
-    (zero,) = [c for c in build.asked(pool()) if c.where == ("frm",)]
+    (zero,) = [c for c in build.select_untried(pool()) if c.where == ("frm",)]
     assert zero.size == 1
     assert zero.values([1.0])[0] == pytest.approx(-5.0, abs=0.5)
 
@@ -96,4 +96,4 @@ def test_a_zero_is_fitted_where_droop_may_not_be_the_models(monkeypatch):
 def test_a_model_that_has_lengths_or_zeros_of_its_own_is_left_alone(monkeypatch):
     mended = puppy_model().with_effect(EffectSpec("zero_offset", ("flm",), {"angle": 4.0}))
     build = seen(filmed(mended.kinematics), monkeypatch, model=mended)
-    assert build.asked(pool()) == pool()
+    assert build.select_untried(pool()) == pool()

@@ -51,7 +51,9 @@ def test_on_an_axis_that_stands_upright_nothing_is_loaded(logged):
     rig = folder / "rig.sdf"
     rig.write_text(rig.read_text().replace("<xyz>0 1 0</xyz>", "<xyz>0 0 1</xyz>"))
     model = load_session(folder / "session.yaml").model
-    assert unloaded_joints(model, [e]) == {"j"}
-    names = {c.name for c in candidates(model, [e])}
+    unloaded = unloaded_joints(model, [e])
+    assert unloaded == {"j"}
+    names = {c.name for c in candidates(model, [e], unloaded)}
     assert not names & LOADED
+    assert set(unobservable(model, [e], unloaded)) >= LOADED
     assert "coulomb_friction" in names

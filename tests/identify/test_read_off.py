@@ -51,9 +51,9 @@ def recorded_with(quiet, model, commands=None):
     """The evaluator's take as another robot, or other commands, would have made it, with the noise that it had."""
     nominal, evaluator = quiet
     e = evaluator.evidence[0]
-    noise = e.recorded - e.simulated(run_job(evaluator.job(nominal, 0, CONFIG)), nominal)
+    noise = e.recorded - e.observe(run_job(evaluator.job(nominal, 0, CONFIG)), nominal)
     job = replace(evaluator.job(model, 0, CONFIG), commands=commands or e.take.commands)
-    return evaluator.on([replace(e, recorded=e.simulated(run_job(job), model) + noise)])
+    return evaluator.on([replace(e, recorded=e.observe(run_job(job), model) + noise)])
 
 
 def nominal_residuals(quiet, evaluator):

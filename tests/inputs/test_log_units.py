@@ -56,7 +56,7 @@ def test_two_sound_joints_in_any_order_have_nothing_to_tell(tmp_path: Path) -> N
     (lambda c: {k: v if k == "time" else v * 1023 / 300 + 512 for k, v in c.items()}, "position.hip", "counts"),
     (_with("velocity.hip", lambda c: np.deg2rad(_slope(c))), "velocity.hip", "radians a second"),
     (_with("velocity.hip", lambda c: _slope(c) / 6), "velocity.hip", "turns a minute"),
-    (_with("velocity.hip", lambda c: -_slope(c)), "velocity.hip", "the other sign"),
+    (_with("velocity.hip", lambda c: -_slope(c)), "velocity.hip", "the opposite sign"),
     (_with("voltage", lambda c: np.full(150, 111.0)), "voltage", "tenths of a volt"),
     (_with("voltage", lambda c: np.full(150, 7400.0)), "voltage", "millivolts"),
     (_with("duty.knee", lambda c: 885 * np.sin(c["time"])), "duty.knee", "counts"),

@@ -98,7 +98,7 @@ def test_a_value_that_means_no_answer_for_several_rows_is_taken_out(tmp_path: Pa
     (lambda p: np.copyto(p, np.clip(p, -9, 9)), "a stop, or a sensor or register that is cut off"),
     (lambda p: np.copyto(p, -30 + np.round(0.4 * np.random.default_rng(1).normal(size=len(p))) * COUNT),
      "does not follow goal.knee"),
-    (lambda p: np.copyto(p, p + 25), "from goal.knee all the time"),
+    (lambda p: np.copyto(p, p + 25), "from goal.knee throughout"),
 ])
 def test_what_keeps_a_joint_from_its_goals_is_told(tmp_path: Path, change: Callable[[np.ndarray], None], said: str) -> None:
     assert any(p.startswith("position.knee: ") and said in p for p in _read(tmp_path, _with("sines", change)).problems)

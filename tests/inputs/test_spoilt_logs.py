@@ -116,7 +116,7 @@ def test_a_pause_is_no_jump_of_the_zero(tmp_path: Path) -> None:
     (lambda t: t[::-1], "all rows are in reverse order"),
     (lambda t: np.mod(t, 3), "two logs in one file"),
     (lambda t: np.round(t, 1), "digits were lost"),
-    (lambda t: np.where(np.arange(len(t)) == 200, t - 0.01, t), "1 row(s) stand there twice"),
+    (lambda t: np.where(np.arange(len(t)) == 200, t - 0.01, t), "1 row(s) occur twice"),
     (lambda t: np.where(np.arange(len(t)) == 200, t - 0.025, t), "go back: sort the rows"),
 ])
 def test_times_that_do_not_increase_are_refused_with_the_remedy(tmp_path: Path, times: Callable[[np.ndarray], np.ndarray],

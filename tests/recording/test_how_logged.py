@@ -9,7 +9,7 @@ import pytest
 
 from tests.shared_data import SHARED
 from workbench.recording.formats.read import read_recording
-from workbench.recording.servo_log.duty_register import RegisterLog, duty_of, law_of, ramped
+from workbench.recording.servo_log.duty_register import RegisterLog, duty_of, law_of, ramp_goals
 from workbench.recording.servo_log.held_sensor import at_their_stamps, refresh_of
 
 COUNT = 2 * np.pi / 4096
@@ -63,7 +63,7 @@ def servo_log(gain: float, seed: int, told: float | None = None) -> tuple[np.nda
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 6.0, 0.01)
     goal = np.where(np.mod(t, 1.5) < 0.75, 0.8, -0.8) if seed % 2 else 0.9 * np.sin((1.0 + seed) * t)
-    reference = ramped(t, goal, t - 0.018, 5.0)
+    reference = ramp_goals(t, goal, t - 0.018, 5.0)
     lagging = np.zeros_like(t)
     for k in range(1, len(t)):
         lagging[k] = lagging[k - 1] + 0.12 * (reference[k - 1] - 0.06 - lagging[k - 1])
@@ -105,8 +105,8 @@ def test_a_servos_law_is_read_from_its_register_over_logs_of_several_gains():
 
 def test_a_goal_ramps_on_its_way_and_stands_where_it_has_come():
     sent, goal = np.array([0.0, 1.0, 1.5]), np.array([0.0, 1.0, 0.8])
-    np.testing.assert_allclose(ramped(sent, goal, np.array([0.5, 1.2, 1.4, 1.6, 3.0]), 1.0), [0.0, 0.2, 0.4, 0.6, 0.8])
-    np.testing.assert_allclose(ramped(sent, goal, np.array([1.2, 1.6]), np.inf), [1.0, 0.8])
+    np.testing.assert_allclose(ramp_goals(sent, goal, np.array([0.5, 1.2, 1.4, 1.6, 3.0]), 1.0), [0.0, 0.2, 0.4, 0.6, 0.8])
+    np.testing.assert_allclose(ramp_goals(sent, goal, np.array([1.2, 1.6]), np.inf), [1.0, 0.8])
 
 
 def test_a_bam_log_with_the_register_in_another_column_has_duty_and_says_so(tmp_path):

@@ -214,13 +214,8 @@ class Run:
         if not log.exists():
             return [] if result.log_problem else ["no log, and nothing said of it"]
         rows = list(csv.DictReader(log.read_text().splitlines()))
-        goals = np.array([[float(row[f"goal.{j}"]) for j in JOINTS] for row in rows])
-        changed = np.flatnonzero(np.abs(np.diff(goals, axis=0)).max(axis=1) > 1e-6)
-        if not np.isfinite(result.started) or not len(changed):
-            return []
-        zero = result.started - float(rows[changed[0] + 1]["time"])
         ids = self.robot.model.bus_ids
-        cells = [(float(row["time"]) + zero, ids[j], np.radians(float(row[f"position.{j}"])))
+        cells = [(float(row["time"]) + result.log_start, ids[j], np.radians(float(row[f"position.{j}"])))
                  for row in rows for j in JOINTS if row[f"position.{j}"]]
         return monitor.log_errors(cells, LOG)
 

@@ -29,13 +29,23 @@ FOUND = [
     ("XL-330", "garbled command", 7, 3),
     ("XL-330", "garbled command", 11, 760),
     ("STS3215", "restart", 615, 6),
+    ("AX-12A", "twin", 180, 217),
+    ("AX-12A", "twin", 260, 219),
+    ("STS3215", "twin", 338, 651),
+    ("STS3215", "twin", 218, 685),
+    ("AX-12A", "cable", 120, 196),
+    ("AX-12A", "deaf port", 173, 474),
+    ("XL-330", "brown-out", 285, 174),
+    ("XL-330", "twin", 271, 883),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
 lost on the wire, or were sent in a bunch after a stall, one 0.5 ms before the next, and exit code 0; answers to another
 program's questions in the log; torque that stayed on where a start failed; two servos of one ID that were taken for one as
 long as an answer could be read now and then, and whose positions were mixed in the log; servos that restarted and got torque,
-at full force, from the next pose; a stall in the first pose, after which all others
-came too early; torque limits and speeds that did not arrive before torque came on."""
+at full force, from the next pose; a stall in the first pose, after which all others came too early; torque limits and speeds that
+did not arrive before torque came on; a servo of two with one ID that still answered when the next was asked, so that that one
+held its goal in the ramp to neutral; positions in the log of a servo that nobody heard any more. The last three were the
+campaign's own: it took the first goal in the log for the first pose, which had been withheld."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])

@@ -150,8 +150,8 @@ def test_both_engines_play_a_log_between_steps_alike(tmp_path, changes):
 
 def test_constants_that_are_not_given_change_nothing_and_are_not_written():
     servo = ServoConstants()
-    assert set(servo.constants()) == set(servo.written()) | {"proportional_gain"}
-    assert "goal_ramp" not in servo.written()
+    assert set(servo.constants()) == set(servo.as_dict()) | {"proportional_gain"}
+    assert "goal_ramp" not in servo.as_dict()
     law = ServoLaw.of([servo])
     assert np.isinf(law.ramp).all()
     for more in (law.lag, law.derivative, law.load_friction):
@@ -162,14 +162,14 @@ def test_constants_that_are_not_given_change_nothing_and_are_not_written():
 
 def test_servo_yaml_gives_them_with_how_well_they_are_known(tmp_path):
     path = tmp_path / "servo.yaml"
-    content = PLAIN.written() | {"goal_delay": {"value": 0.02, "sd": 0.01}, "goal_ramp": 290, "minimum_duty": 0.015,
+    content = PLAIN.as_dict() | {"goal_delay": {"value": 0.02, "sd": 0.01}, "goal_ramp": 290, "minimum_duty": 0.015,
                                  "torque_tolerance": 0.5, "back_emf_tolerance": 0.3}
     path.write_text(yaml.safe_dump(content))
     servo = load_servo_constants(path)
     assert servo.share_known("goal_delay") == pytest.approx(0.5)
     assert servo.share_known("torque_at_full_duty") == 0.5
     assert servo.share_known("back_emf") == 0.3
-    path.write_text(yaml.safe_dump(servo.written()))
+    path.write_text(yaml.safe_dump(servo.as_dict()))
     assert load_servo_constants(path) == servo
 
 

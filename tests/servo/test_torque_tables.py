@@ -88,7 +88,7 @@ def test_servo_and_model_files_keep_tables(rig, tmp_path):
     model = rig(*TABLES)
     save_model(model, tmp_path / "model.yaml")
     assert load_model(tmp_path / "model.yaml").servo("j").torque_tables == TABLES
-    (tmp_path / "servo.yaml").write_text(yaml.safe_dump(model.servo("j").written()))
+    (tmp_path / "servo.yaml").write_text(yaml.safe_dump(model.servo("j").as_dict()))
     assert load_servo_constants(tmp_path / "servo.yaml") == model.servo("j")
     assert model.sha256 != rig().sha256
 
@@ -103,6 +103,6 @@ def test_servo_and_model_files_keep_tables(rig, tmp_path):
 ])
 def test_a_table_that_cannot_be_is_refused(tmp_path, tables, said):
     path = tmp_path / "servo.yaml"
-    path.write_text(yaml.safe_dump(SERVO.written() | {"torque_tables": tables}))
+    path.write_text(yaml.safe_dump(SERVO.as_dict() | {"torque_tables": tables}))
     with pytest.raises(InputError, match=said):
         load_servo_constants(path)

@@ -167,8 +167,8 @@ def test_a_vector_has_a_row_for_each_component_in_a_unit_that_suits_the_largest(
     (Unexplained(("flm",), 1.0, 0.5, "deg", Dependence("walk", "flm~z", "time", 0.8)),
      ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "closely with time (0.80)"]),
     (Unexplained(("frb",), 0.6, 0.2, "deg", ParameterDrift("com_shift", ("frb_link",), "offset", 1.0, 2.0, "m")),
-     ["frb", "", "0.6 deg", "3.0×", "offset of centre of mass shift at frb_link would have to go from 1 to 2 m within a take: "
-                                     "something that changes looks like it"]),
+     ["frb", "", "0.6 deg", "3.0×", "offset of centre of mass shift at frb_link would have to change from 1 to 2 m within a "
+                                     "take: something that varies with time may be the cause"]),
 ])
 def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str]) -> None:
     assert left_row(entry) == row
@@ -179,7 +179,7 @@ def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(mo
     off = Unexplained(("brm",), 0.567, 0.206, "deg", Dependence("sway", "brm"))
     told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
-    assert all("The tether force is a pull straight down, with the weight of 76 g that does" in page for page in told.values())
+    assert all("The tether force is a vertical pull of 76 g, but without the inertia of a load" in page for page in told.values())
     assert ["still exceeds noise" in page for page in told.values()] == [False, True]
 
 
@@ -260,7 +260,7 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeRep
     quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
     assert "The recordings do not differ from the nominal model by more than chance." in page
-    assert "Afterwards all is within" in page
+    assert "everything is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
 

@@ -36,5 +36,14 @@ def test_a_tie_of_gravity_and_torque_leads_and_its_names_have_their_own_share(tm
 
 def test_where_a_known_weight_leaves_one_cause_it_is_said() -> None:
     names = (TiedName("payload", ("FLmid",), {}, "It is a payload.", 26.0),)
-    tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0)
+    tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0, weighed=True)
     assert tied_in_short(tie).endswith("times that of the files. Cause: other torques of the servo.")
+    assert "recordings leave one: all torques" in tie.in_words()
+
+
+def test_without_a_known_weight_a_load_may_account_for_a_part() -> None:
+    names = (TiedName("payload", ("FLmid",), {}, "It is a payload.", 26.0),)
+    tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0)
+    assert "alone or together with a change of what it carries" in tied_in_short(tie)
+    assert "may account for a part of it" in tie.in_words()
+    assert "hang a known weight" in tie.in_words()

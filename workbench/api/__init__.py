@@ -1,1 +1,2 @@
-"""What `import workbench` offers: sessions in, typed results out, which save themselves and show themselves in a notebook."""
+"""What `import workbench` offers: functions that take sessions and return typed results, which can be saved or shown in a
+notebook."""

@@ -15,18 +15,18 @@ from typing import Any, Literal
 
 import workbench
 from workbench.files import InputError
-from workbench.files.plug_ins import installed
+from workbench.files.plug_ins import list_installed
 
 State = Literal["ok", "missing", "broken"]
 MEMORY_GB, DISK_GB = 4.0, 1.0
-"""Below that a diagnosis on two processes swaps, and results of a few takes do not fit."""
+"""With less memory a diagnosis on two processes swaps; with less disk the results of a few takes do not fit."""
 PYTHON = (3, 11)
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing looked at. state: "missing" is optional or can be got; "broken" keeps the workbench from working. remedy: what to
-    do, empty where nothing has to be done."""
+    """One check. state: "missing" is optional or can be installed; "broken" prevents the workbench from working. remedy: what to
+    do; empty if nothing has to be done."""
 
     name: str
     state: State
@@ -36,7 +36,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Health:
-    """All that was looked at."""
+    """All checks."""
 
     checks: tuple[Check, ...]
 
@@ -71,15 +71,15 @@ def compile_rollouts() -> None:
 
 
 def examine(defaults: Path) -> Health:
-    """Looks at versions, cores, memory, disk, the compiler's cache, Meshcat, the second engine, shell completion. defaults: where
-    the user's own would be."""
+    """Checks versions, cores, memory, disk, the compiler's cache, Meshcat, the second engine and shell completion. defaults: path
+    of the user's own defaults."""
     looks: tuple[Callable[[], Check], ...] = (
         _python, lambda: _package("drake", "pydrake.all", True, "pip install drake; on Debian it needs libglib2.0-0"),
         lambda: _package("numpy", "numpy", True, "pip install numpy"),
         lambda: _package("scipy", "scipy", True, "pip install scipy"),
         lambda: _package("numba", "numba", False, "pip install numba: compiled rollouts, which fits use"),
         lambda: _package("mujoco", "mujoco", False, "pip install 'mujoco[sysid]': the second engine of studies and certificates"),
-        _cores, _memory, _disk, _compiled, _meshcat, _completion, _effects, _formats, _servos, lambda: _defaults(defaults))
+        _cores, _memory, _disk, _check_compiled, _meshcat, _completion, _effects, _formats, _servos, lambda: _defaults(defaults))
     return Health((Check("workbench", "ok", f"{workbench.__version__} in {Path(workbench.__file__).parent}"),
                    *(look() for look in looks)))
 
@@ -97,7 +97,7 @@ def _package(name: str, module: str, needed: bool, remedy: str) -> Check:
         return Check(name, "broken" if needed else "missing", "not installed", remedy)
     try:
         import_module(module)
-    except Exception as e:  # whatever keeps it from loading is what has to be said
+    except Exception as e:  # any exception on import is the finding
         return Check(name, "broken", f"{found} does not load: {' '.join(str(e).split())[:120]}", remedy)
     return Check(name, "ok", found)
 
@@ -124,7 +124,7 @@ def _disk() -> Check:
                  f"results may not fit: free {DISK_GB:g} GB, or give --out on another disk" if few else "")
 
 
-def _compiled() -> Check:
+def _check_compiled() -> Check:
     try:
         from workbench.simulation.compiled.kernel import cache_folder
     except ImportError:
@@ -147,7 +147,7 @@ def _meshcat() -> Check:
         from workbench.view.scene.live import open_meshcat
 
         url = open_meshcat().web_url()
-    except Exception as e:  # Drake says why in many ways
+    except Exception as e:  # Drake raises various types here
         return Check("Meshcat", "missing", " ".join(str(e).split())[:120], "free a port from 7000 on, or use --port")
     return Check("Meshcat", "ok", f"serves at {url}")
 
@@ -171,8 +171,8 @@ def _servos() -> Check:
 
 
 def _extensible(name: str, group: str, known: Callable[[], Collection[str]]) -> Check:
-    """All that is known of a kind, by name, and which packages add to it."""
-    added = [f"{entry} from package {package}" for entry, package in installed(group).items()]
+    """Everything known of one kind, by name, and the packages that add to it."""
+    added = [f"{entry} from package {package}" for entry, package in list_installed(group).items()]
     try:
         names = sorted(known())
     except InputError as e:

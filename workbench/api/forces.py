@@ -21,7 +21,8 @@ from workbench.types import Progress, no_progress
 
 def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress, model: RobotModel | None = None,
                    ) -> tuple[RobotModel, InverseDynamicsResult]:
-    """Of the recorded take `name` of a session; with the robot as it was in that take. model: another than the session's."""
+    """Inverse dynamics of the recorded take `name` of a session, with the robot as it was in that take. model: another one than
+    the session's."""
     session = load_session(path)
     session = session if model is None else session.with_model(model)
     chosen = [t for t in session.takes if t.name == name]
@@ -32,9 +33,9 @@ def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress
 
 def forces_of_file(path: str | Path, model: RobotModel, base: Base = "free", cycles: int | None = None,
                    commanded: str | Path | None = None, progress: Progress = no_progress) -> InverseDynamicsResult:
-    """Of a rollout, on the base it says; of a motion played `cycles` times on the base given; or of a recording, whose
-    `commanded` motion was played so often. On a free base a motion does not say how the body moves: it is simulated with
-    ideal joints first."""
+    """Inverse dynamics of a rollout, on its own base; of a motion played `cycles` times on the given base; or of a recording of a
+    `commanded` motion, played `cycles` times. On a free base a motion does not determine how the body moves, so it is first
+    simulated with ideal joints."""
     kind = file_kind(path)
     if kind == "recording":
         spec = TakeSpec(Path(path).stem, Path(path), None if commanded is None else Path(commanded), cycles, base)
@@ -54,8 +55,8 @@ def forces_of_file(path: str | Path, model: RobotModel, base: Base = "free", cyc
 
 
 def _of_recording(session: Session, spec: TakeSpec, progress: Progress) -> InverseDynamicsResult:
-    """Registered against its simulation. One take alone may leave the session's yaw a little off; that turns forces with the body
-    about the vertical, and changes no torque."""
+    """Inverse dynamics of a recording registered against its simulation. A single take may leave the session's yaw slightly off;
+    that turns forces with the body about the vertical and changes no torque."""
     (read,), _ = read_takes(replace(session, takes=(spec,)))
     run = Run(spec.name, read.model, read.commands, read.duration, spec.base)
     (rollouts,) = roll_out([run], SimulationConfig(engine="drake"), progress=progress, n_jobs=1, floors=False)

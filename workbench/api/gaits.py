@@ -40,19 +40,19 @@ class GaitResult:
 
     @property
     def motion(self) -> Motion:
-        """The gait as poses from neutral to neutral, in sections: times (K,) [s], angles (K, n) [rad]; its cycles are
-        those of the certificate. InputError where there is none."""
-        table, certified = self._found()
+        """The gait as poses from neutral to neutral, in sections: times (K,) [s], angles (K, n) [rad]; its cycles are those of
+        the certificate. InputError if no gait was found."""
+        table, certified = self._require_gait()
         return replace(Motion.from_table(table.whole), cycles=certified.cycles)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Writes gait.csv, certificate.json and report.html; returns their paths. InputError where no gait was found, or they
         cannot be written."""
         Path(folder).mkdir(parents=True, exist_ok=True)
-        written = write_gait(Path(folder), *self._found())
+        written = write_gait(Path(folder), *self._require_gait())
         return [write_gait_page(Path(folder), self.model, self.optimized), *written]
 
-    def _found(self):  # type: ignore[no-untyped-def]
+    def _require_gait(self):  # type: ignore[no-untyped-def]
         if self.optimized.table is None or self.optimized.certified is None:
             raise InputError(None, f"no gait was found: {self.problem}")
         return self.optimized.table, self.optimized.certified
@@ -63,11 +63,12 @@ class GaitResult:
 
 def optimize(model: RobotModel, request: Request | None = None, options: OptimizeOptions | None = None, *,
              ensemble: Ensemble | None = None, progress: Progress = no_progress, memory: Path | None = None) -> GaitResult:
-    """Searches for a gait within the limits of joints, servos and supply, on an ensemble of robots that this one may be.
+    """Searches for a gait within the limits of joints, servos and supply, on an ensemble of robots, any of which this one might
+    be.
 
     request: None: the fastest walk forward. options: size of the search, certificate, seed. ensemble: None: the one that ships.
-    progress: called with the stage and the share done. memory: a file from which a run that was killed continues. Returns table,
-    certificate and which limit binds, also where the request cannot be met. InputError for a robot without legs.
+    progress: called with the stage and the share done. memory: a file from which a run that was killed continues. Returns the
+    table, the certificate and the binding limit, even if the request cannot be met. InputError for a robot without legs.
     """
     found = seek(GaitMachine(model), request or Request(), ensemble or load_ensemble(), options or OptimizeOptions(), progress,
                  memory, other_engine())

@@ -20,9 +20,9 @@ from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile, servo_profiles
 
 _KG_CM = 0.0980665
-"""Of one kg cm [N m]."""
+"""One kg cm [N m]."""
 _MOVES_FULL = math.radians(15.0)
-"""Error [rad] at which a hobby servo is guessed to give full duty, to a factor of 2."""
+"""Error [rad] at which a hobby servo is assumed to reach full duty, to within a factor of 2."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def servo_types() -> Mapping[str, Mapping[str, Any]]:
 
 
 def known_servos() -> tuple[str, ...]:
-    """Names that `new_robot` takes for its servo."""
+    """Names that `new_robot` accepts for its servo."""
     return tuple(sorted({*servo_types(), *servo_profiles()}))
 
 
@@ -102,13 +102,13 @@ def _from_sheet(sheet: Mapping[str, Any]) -> tuple[dict[str, Any], str, float]:
     friction = 0.03 * stall
     values = {
         "stall_torque": round(stall, 3), "no_load_speed": round(speed, 3), "rated_voltage": rated, "supply_voltage": rated,
-        "coulomb_friction": _known(friction, 1.0), "viscous_friction": _known(0.01 * stall, 1.0),
-        "reflected_inertia": _known(0.0035 * stall, 1.0), "proportional_gain": _known(1 / _MOVES_FULL, 0.7),
+        "coulomb_friction": _with_sd(friction, 1.0), "viscous_friction": _with_sd(0.01 * stall, 1.0),
+        "reflected_inertia": _with_sd(0.0035 * stall, 1.0), "proportional_gain": _with_sd(1 / _MOVES_FULL, 0.7),
         "torque_tolerance": 0.5, "back_emf_tolerance": 0.5}
     return values, str(sheet["source"]), math.radians(sheet["range"])
 
 
-def _known(value: float, share: float) -> dict[str, float]:
+def _with_sd(value: float, share: float) -> dict[str, float]:
     return {"value": float(f"{value:.3g}"), "sd": float(f"{share * value:.2g}")}
 
 
@@ -117,7 +117,7 @@ def _plain(name: str) -> str:
 
 
 def _ranges(model: RobotModel, travel: float) -> list[str]:
-    """Joints that the description lets go further than the servo turns, or does not limit."""
+    """Joints for which the description allows more travel than the servo has, or states no limit."""
     frames, out = model.kinematics.frames, []
     free = [j for j in model.joints if not math.isfinite(frames[j].upper - frames[j].lower)]
     far = [j for j in model.joints if j not in free and max(abs(frames[j].lower), abs(frames[j].upper)) > travel / 2 + 0.01]
@@ -141,18 +141,18 @@ def _session(description: str | Path, out: Path, root: str, feet: Sequence[str],
              packages: Mapping[str, str], joints: Sequence[str]) -> str:
     name = str(description)
     model = name if name.startswith("package://") else _relative(name, out)
-    lines = ["format: 1", "robot:", f"  model: {_quoted(model)}", f"  base: {_quoted(root)}", "  servos: servo.yaml"]
+    lines = ["format: 1", "robot:", f"  model: {_quote(model)}", f"  base: {_quote(root)}", "  servos: servo.yaml"]
     if feet:
-        lines.append(f"  feet: [{', '.join(map(_quoted, feet))}]")
+        lines.append(f"  feet: [{', '.join(map(_quote, feet))}]")
     if packages:
-        found = (f"{_quoted(n)}: {_quoted(_relative(d, out))}" for n, d in packages.items())
+        found = (f"{_quote(n)}: {_quote(_relative(d, out))}" for n, d in packages.items())
         lines.append("  packages: {" + ", ".join(found) + "}")
     lines.append("  # bus_ids: {" + ", ".join(f"{joint}: ?" for joint in joints) + "}")
     base = "fixed" if held else "free"
     if takes:
         lines.append("takes:")
         for path in takes:
-            lines += [f"- name: {_quoted(Path(path).stem)}", f"  recording: {_quoted(_relative(path, out))}", f"  base: {base}"]
+            lines += [f"- name: {_quote(Path(path).stem)}", f"  recording: {_quote(_relative(path, out))}", f"  base: {base}"]
     else:
         lines += ["# list your recordings here, for instance", "# takes:", "# - name: slow", "#   recording: takes/slow.csv",
                   f"#   base: {base}          # fixed: on a stand or a table; free: it walks"]
@@ -163,6 +163,6 @@ def _relative(path: str | Path, out: Path) -> str:
     return Path(os.path.relpath(Path(path).resolve(), out.resolve())).as_posix()
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     plain = all(c.isalnum() or c in "_./-" for c in text) and text[:1].isalpha() and yaml.safe_load(text) == text  # not null, yes
     return text if plain else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,4 +1,4 @@
-"""A gait steered on the robot: the CM-530 plays it, cameras see it, and each cycle's table is chosen while another plays."""
+"""Steers a gait on the robot: the CM-530 plays it, cameras see it, and each cycle's table is chosen while another one plays."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def drive_on_robot(port: Any, model: RobotModel, family: GaitFamily, path: WayPa
                    progress: Progress = lambda what, done: None, watch: Watch | None = None) -> RobotDrive:
     """Steers the robot behind `port`, the PC link of a CM-530 with the workbench's program, along `path`.
 
-    stop: "" until the user wants it to end. virtual: the emulated robot behind the port, whose true way is then known. However it
-    ends, the robot is released: after its stop section or, where it was stopped, a ramp to neutral; at once where it fell.
-    BusError in one line where the controller is not there, refuses a table, or does not confirm the release.
+    stop: "" until the user wants it to end. virtual: the emulated robot behind the port, whose true path is then known. However
+    it ends, the robot is released: after its stop section or, if it was stopped, a ramp to neutral; at once if it fell. BusError
+    in one line if the controller is not there, refuses a table, or does not confirm the release.
     """
     walk = ControllerWalk(port, family, cameras, stop, options, progress)
     gently = False

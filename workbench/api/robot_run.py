@@ -1,4 +1,4 @@
-"""A motion on the robot, from the preflight to a session that can be compared and diagnosed."""
+"""Runs a motion on the robot, from the preflight checks to a session that can be compared and diagnosed."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from workbench.compare.options import COMPARE
 from workbench.compare.session_file import write_session
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import family_of, survey
-from workbench.device.capture import Capture, Recorder, record_take
-from workbench.device.capture.background import BackgroundRecording
+from workbench.device.capture import BackgroundRecording, Capture, Recorder, record_take
 from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
 from workbench.device.tables.table_file import table_file
@@ -43,8 +42,8 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
                  options: PlayOptions | None = None, seed: int = 0, progress: Progress | None = None) -> RobotRun:
     """Checks all servos, plays the motion while the cameras record, and writes takes, registers, motion and session.
 
-    virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError
-    where something has to be fixed first; nothing was moved then.
+    virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError if
+    something has to be fixed first; then nothing has moved.
     """
     tell = progress or (lambda what, done: None)
     found = survey(bus, model, ids=(), progress=tell)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.compare.session import load_session
-from workbench.effects.apply import resolved
+from workbench.effects.apply import resolve
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
 from workbench.robot import ROBOTS, RobotModel, puppy_model, resource_dir
@@ -40,7 +40,7 @@ def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None =
         return load_session(name).model
     model = read_model_file(name)
     try:
-        list(resolved(model))
+        list(resolve(model))
     except InputError as e:
         raise InputError(name, f"effects: {e.problem}") from None
     return model
@@ -50,8 +50,9 @@ def save_model(model: RobotModel, path: str | PathLike[str], posterior: Posterio
                provenance: Mapping[str, Any] | None = None) -> Path:
     """Writes model.yaml, whole or not at all; returns its path.
 
-    posterior: of the effects' parameters, provenance: how they were found; both are kept for a reader and change nothing.
-    InputError where an effect is unknown, acts at no such part or has impossible numbers, or where the file cannot be written.
+    posterior: of the effects' parameters, provenance: how they were found; both are kept for the reader and do not affect
+    simulation. InputError if an effect is unknown, acts on a part that does not exist or has impossible numbers, or if the file
+    cannot be written.
     """
-    list(resolved(model))
+    list(resolve(model))
     return write_model_file(model, Path(path), posterior, provenance)

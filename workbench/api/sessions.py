@@ -1,4 +1,4 @@
-"""Compare, diagnose and predict a session: each gives a result that saves itself."""
+"""Compare, diagnose and predict a session; each result can save itself."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class DiagnosisResult:
             save_motion(self.next_motion, paths[-1])
         if self.session.predict:
             (folder / "predict").mkdir(exist_ok=True)
-            judged = self.diagnosis.provenance.get("engine", {}).get("rollouts by") == COMPILED  # on these very models
+            judged = self.diagnosis.provenance.get("engine", {}).get("rollouts by") == COMPILED  # made with these very models
             config = SimulationConfig(contact_period=0, engine="auto" if judged else "drake")
             paths += predict_session(self.session, self.model, folder / "predict", progress, nominal=self.session.model,
                                      config=config, n_jobs=jobs).paths

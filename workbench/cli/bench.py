@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.files import InputError
 
     try:
-        benchmarks = import_module("benchmarks.run")  # by name: it lies beside the package, in the repository alone
+        benchmarks = import_module("benchmarks.run")  # imported by name: it is in the repository but not in the installed package
     except ModuleNotFoundError as e:
         if e.name != "benchmarks":
             raise

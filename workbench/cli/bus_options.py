@@ -47,7 +47,7 @@ def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | 
 
 @contextmanager
 def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> Iterator[Bus]:
-    """The bus, whose port is closed at the end; BusError in one line where there is none."""
+    """The bus, whose port is closed at the end; BusError in one line if there is none."""
     from workbench.device.bus import Bus
     from workbench.device.bus.survey import family_of
     from workbench.robot import bus_ids
@@ -108,7 +108,7 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
                 port.closePort()
         return
     if args.image is None:
-        raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+        raise InputError(None, "the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
     if find_spec("unicorn") is None:
         raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     try:

@@ -1,4 +1,5 @@
-"""Checks of every verb before the long work: problems of its files, on stderr, and whether very long simulations are intended."""
+"""Checks that every verb makes before the long work: reports problems of its files on stderr, and refuses very long simulations
+unless they are intended."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
-    """Warns of a session's problems and returns the names of the takes that are left out. InputError where its takes cannot be
-    used, or cannot be used together, or where one is so long that it is probably a mistake, unless `yes`."""
+    """Warns of a session's problems and returns the names of the takes that are left out. InputError if its takes cannot be used,
+    or cannot be used together, or if one is so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import session_check
 
@@ -51,7 +52,7 @@ def check_model(verb: str, model: RobotModel) -> None:
 
 
 def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
-    """Warns of a motion's problems; InputError where it lasts so long that it is probably a mistake, unless `yes`."""
+    """Warns of a motion's problems; InputError if it lasts so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import motion_problems, slow_poses, summed_up
 
@@ -63,31 +64,23 @@ def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool
 
 
 def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
-    """Checks that the certificate of a motion made by `optimize` is valid for this robot; InputError where it is not, unless
+    """Checks that the certificate of a motion made by `optimize` is valid for this robot; InputError if it is not, unless
     `force`, which only warns. Every verb that moves a robot, or writes tables that move one, calls this first."""
-    from workbench.files import InputError
-    from workbench.gait.certificate import check_certificate, has_mark
+    from workbench.gait.certificate import has_mark
 
-    if not has_mark(path):
-        return
-    try:
-        check_certificate(path, motion, model)
-    except InputError as e:
-        if not force:
-            raise InputError(e.source, f"{e.problem}; use --force to override") from None
-        warn(verb, [str(e)])
+    if has_mark(path):
+        _check_certificate(verb, path, motion, model, force)
 
 
 def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None:
-    """The same for a binary table, which does not name its maker: a certificate in its folder must be its own; without one, the
-    joints' limits are checked as for any motion. InputError, unless `force`, which warns."""
+    """The same for a binary table, which does not say what wrote it: a certificate in its folder must be its own; without one,
+    the joints' limits are checked as for any motion. InputError, unless `force`, which warns."""
     from dataclasses import replace
     from pathlib import Path
 
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.device.tables.table_file import read_table_file
-    from workbench.files import InputError
-    from workbench.gait.certificate import NAME, check_certificate
+    from workbench.gait.certificate import NAME
     from workbench.motion import Motion
     from workbench.robot import bus_ids
 
@@ -99,8 +92,15 @@ def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None
     if not Path(path).with_name(NAME).is_file():
         warn(verb, [str(v) for v in refuse_broken_limits(table, model, force, None, "not loaded")])
         return
+    _check_certificate(verb, path, Motion.from_table(table), model, force)
+
+
+def _check_certificate(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
+    from workbench.files import InputError
+    from workbench.gait.certificate import check_certificate
+
     try:
-        check_certificate(path, Motion.from_table(table), model)
+        check_certificate(path, motion, model)
     except InputError as e:
         if not force:
             raise InputError(e.source, f"{e.problem}; use --force to override") from None

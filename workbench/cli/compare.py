@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_cycles(parser, 1)
     add_yes(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
-    add_engine(parser, "the finer steps of a session's numerical floor compiled where Drake judged that to be the same")
+    add_engine(parser, "compiled rollouts for the finer steps of a session's numerical floor, where they agree with Drake")
     add_out(parser)
     parser.set_defaults(run=run)
 

@@ -17,7 +17,7 @@ from typing import Any
 
 
 def defaults_file() -> Path:
-    """Where it is, whether it exists or not."""
+    """Its path, whether or not it exists."""
     named = os.environ.get("WORKBENCH_DEFAULTS")
     folder = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
     return Path(named) if named else folder / "workbench/defaults.yaml"
@@ -58,7 +58,7 @@ def _action(parser: argparse.ArgumentParser, option: object) -> argparse.Action 
 
 
 def _value(action: argparse.Action, value: Any, path: Path, key: str) -> Any:
-    """As if it had been typed."""
+    """The value as argparse would have parsed it from the command line."""
     if action.nargs == 0:
         if not isinstance(value, bool):
             _refuse(path, f"{key}: expected true or false, got {value!r}")

@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs it, prints the table and where the report is."""
+    """Runs it, and prints the table and the report's path."""
     from workbench.api.demo.page import run_demo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress

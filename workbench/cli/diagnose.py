@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 STAGES = ("reading", "simulating", "looking again", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
-"""Of a search that goes back and forth, the last begun."""
+"""A search goes back and forth between its stages; the last one begun is shown."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

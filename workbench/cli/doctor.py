@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Looks and prints."""
+    """Examines the installation and prints the result."""
     from workbench.api.doctor import compile_rollouts, examine
     from workbench.cli.defaults import defaults_file
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli.bus_options import VIRTUAL
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_model, add_out, load_model, positive, seed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,13 +47,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="a disc on the floor to walk around, centre and radius [m]; repeatable")
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")
-    truth.add_argument("--draw", type=int, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
+    truth.add_argument("--draw", type=seed, metavar="SEED", help="simulate a random variant of the robot, as for certificates")
     parser.add_argument("--law", choices=("mpc", "proportional"), default="mpc", help="controller (default: mpc)")
     parser.add_argument("--lost", type=_share, default=0.0, metavar="SHARE",
                         help="share of cycles without a pose, in simulation (default: 0)")
     parser.add_argument("--blind", type=_seconds, default=1.5, metavar="SECONDS",
                         help="stop after so long without a pose (default: 1.5)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of map and cameras (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="random seed of map and cameras (default: 0)")
     parser.add_argument("--cycles", type=positive, default=100, metavar="N", help="stop after so many cycles (default: 100)")
     parser.add_argument("--view", action="store_true", help="show path, plan and robot live in the browser (Meshcat)")
     parser.add_argument("--port", metavar="PORT", help="serial port of the PC link of the robot's CM-530, with the workbench's "
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
     if certified:
-        options = replace(options, most=certified.most, most_change=certified.most_change)
+        options = replace(options, **certified.limits)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fit_map(args, family, progress)
@@ -134,7 +134,7 @@ def _load_certificate(args: argparse.Namespace, model: RobotModel) -> FamilyCert
         return read_family(args.gait, model)
     except InputError as e:
         if args.port is not None and not args.force:
-            raise InputError(e.source, f"{e.problem}; --force drives all the same") from None
+            raise InputError(e.source, f"{e.problem}; use --force to drive anyway") from None
         if (Path(args.gait).parent / FILE).is_file():
             warn("drive", [str(e)])
         return None
@@ -148,7 +148,7 @@ def _fit_map(args: argparse.Namespace, family: GaitFamily, progress: Callable[..
 
 
 def _check_port(args: argparse.Namespace, model: RobotModel) -> None:
-    """The gait's certificate, and options that do not fit together; InputError."""
+    """Checks the gait's certificate, and that the options fit together; InputError if not."""
     from workbench.cli.check import check_certificate_of
     from workbench.files import InputError
     from workbench.motion import load_motion
@@ -199,8 +199,7 @@ def _virtual(args: argparse.Namespace, robot: RobotModel) -> VirtualRobot | None
 @contextmanager
 def _cameras(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None, folder: Path) -> Iterator[PoseSource]:
     """The emulated robot's, or Motive's, whose whole recording is kept in `folder`."""
-    from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.capture.background import BackgroundRecording
+    from workbench.device.capture import BackgroundRecording, Recorder, UdpLink
     from workbench.gait.drive.cameras import EmulatedCameras, MotiveCameras
     from workbench.gait.drive.walk import Cameras
 

@@ -37,7 +37,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Builds, asks, loads, keeps the transcript."""
+    """Builds, asks, loads, and saves the transcript."""
     from workbench.cli.progress import Progress
     from workbench.device.controller.loader import FACTORY, MOVES, LoadError, Loading, Transcript
     from workbench.device.controller.loader_profile import load_loader_profile

@@ -30,7 +30,7 @@ class RunLog(logging.Handler):
         self.lines.append(f"{time.monotonic() - self._began:9.1f} s  {record.getMessage()}")
 
     def write(self, folder: Path | None, code: int) -> None:
-        """Appends this run to the folder's log; nothing where the run has no folder, or wrote nothing into it (`code` is not
+        """Appends this run to the folder's log; does nothing if the run has no folder, or wrote nothing into it (`code` is not
         0)."""
         if code != 0 or folder is None or not folder.is_dir():
             return
@@ -38,7 +38,7 @@ class RunLog(logging.Handler):
         try:
             with (folder / NAME).open("a", encoding="utf-8") as f:
                 f.write("\n".join(self.lines) + "\n\n")
-        except OSError as e:  # the results are there; a log is not worth failing for
+        except OSError as e:  # the results are complete; a missing log is no reason to fail
             print(f"workbench: warning: {folder / NAME}: cannot be written ({e.strerror})", file=sys.stderr)
 
 

@@ -37,9 +37,9 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Ends with exit code 2 and one line on stderr."""
         text = " ".join(message.split())
-        self.exit(2, f"{self.prog}: error: {text}{self._meant(text)} (see {self.prog} --help)\n")
+        self.exit(2, f"{self.prog}: error: {text}{self._guess(text)} (see {self.prog} --help)\n")
 
-    def _meant(self, message: str) -> str:
+    def _guess(self, message: str) -> str:
         """A guess at the verb or option that was meant by an unknown one."""
         options = [o for a in self._actions for o in a.option_strings if o.startswith("--")]
         for pattern, known in ((r"invalid choice: '([^']+)'", list(VERBS)), (r"unrecognized arguments: (--[\w-]+)", options)):
@@ -51,7 +51,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser with every verb's arguments; imports no other package, so that help comes at once."""
+    """The parser with every verb's arguments; imports no other package, so that --help is fast."""
     parser = OneLineParser(
         prog="workbench", description=(workbench.__doc__ or "").partition("\n")[0], allow_abbrev=False,
         epilog="`workbench VERB --help` explains each. Exit codes: 0 success, 1 internal error, 2 invalid input (one line: "
@@ -93,15 +93,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace, alone: bool) -> int:
-    """Runs the verb. alone: whether this process is for nothing else, so that libraries' warnings may be silenced."""
-    logging.getLogger("drake").addFilter(_serious)  # what Drake warns of in a model is told by the workbench
-    previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
+    """Runs the verb. alone: whether this process does nothing else, so that libraries' warnings may be silenced."""
+    logging.getLogger("drake").addFilter(_serious)  # the workbench reports what Drake warns about in a model
+    previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # so that clean-up code runs
     forget_warnings()
     if alone:  # matrices are small and rollouts run side by side: further threads would only wait for each other
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
+    if alone and not sys.warnoptions:  # from libraries, meant for their developers
         warnings.simplefilter("ignore")
-        os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
+        os.environ["PYTHONWARNINGS"] = "ignore"  # in worker processes, too
     try:
         code: int = args.run(args)
         show_warnings()
@@ -111,7 +111,7 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
         again = "; call it again to continue from there" if args.verb == "diagnose" else ""
         print(f"\nworkbench {args.verb}: interrupted, nothing was written{again}", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # the reader of our output has seen enough
+    except BrokenPipeError:  # whoever reads our output has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError as e:
@@ -149,7 +149,7 @@ def _report(name: str, error: OSError | ValueError) -> int:
 
 
 def _serious(record: logging.LogRecord) -> bool:
-    return record.levelno > logging.ERROR  # an error of its parser is raised as one
+    return record.levelno > logging.ERROR  # Drake's parser logs its errors and raises them, too
 
 
 def _readable(error: OSError | ValueError) -> str | None:

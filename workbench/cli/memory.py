@@ -42,11 +42,11 @@ def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> I
     try:
         yield folder
     except InputError:
-        shutil.rmtree(folder, ignore_errors=True)  # the same input would be refused again
+        shutil.rmtree(folder, ignore_errors=True)  # the same input would only be refused again
         raise
     except OSError as e:
         if e.filename is None and e.errno in (None, errno.ENOSPC, errno.EDQUOT):
-            shutil.rmtree(folder, ignore_errors=True)  # it would keep the disk full
+            shutil.rmtree(folder, ignore_errors=True)  # keeping it would leave the disk full
             raise InputError(out, "the disk is full; the cached rollouts are deleted") from None
         raise
     for done in beside.parent.glob(f"{glob.escape(kept)}*"):
@@ -58,5 +58,5 @@ def _digest(session: Session) -> str:
     for path in (session.path, *(p for t in session.takes for p in (t.recording, t.motion) if p is not None)):
         if Path(str(path).partition("#")[0]).exists():
             digest.update(Path(str(path).partition("#")[0]).read_bytes())
-    digest.update(rollout_code().encode())  # another version of the code may simulate otherwise
+    digest.update(rollout_code().encode())  # another version of the code may simulate differently
     return digest.hexdigest()[:STAYS]

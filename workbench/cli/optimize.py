@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from workbench.cli.check import check_model
-from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive, seed
 
 if TYPE_CHECKING:
     from workbench.gait.optimize import OptimizeOptions
@@ -49,10 +49,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "optimisation as tables, without a search; both: a search that also starts from those (default: search)")
     parser.add_argument("--start", metavar="MOTION", help="the gait.csv of another gait: the search starts there instead of from "
                         "random gaits; its certificate is read from the same folder")
-    parser.add_argument("--map", metavar="FILE", help="map.json of a map of gaits: the search also starts from its nearest gait")
+    parser.add_argument("--map", metavar="FILE", nargs="?", const="", help="map.json of a map of gaits: the search also starts "
+                        "from its nearest gait (without FILE: the map of the puppy that ships)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N",
                         help="search effort: 1 for a first look, more for longer (default: 4)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_model(parser)
     add_out(parser, default="runs/optimize")
@@ -60,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Searches, certifies, writes, and says what came of it."""
+    """Searches, certifies, writes, and prints the result."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
@@ -94,21 +95,23 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _options(args: argparse.Namespace, model: RobotModel, request: Request) -> OptimizeOptions:
-    """Size, method and start of the search."""
+    """Size, method and starting point of the search."""
     from dataclasses import replace
 
     from workbench.files import InputError
     from workbench.gait.certificate import read_shape
     from workbench.gait.gait_map import load_map
     from workbench.gait.optimize import options_of
+    from workbench.robot import data_file
 
     options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
+    for given in ("start", "map"):
+        if args.method == "plan" and getattr(args, given) is not None:
+            raise InputError(None, f"--{given} with --method plan: expected a method that searches")
     if args.map is not None:
-        options = replace(options, given=(load_map(args.map, model).start_for(request),))
+        options = replace(options, given=(load_map(args.map or data_file("gaits/map.json"), model).start_for(request),))
     if args.start is None:
         return options
-    if args.method == "plan":
-        raise InputError(None, "--start with --method plan: expected a method that searches")
     return replace(options, given=(*options.given, read_shape(args.start)), planned=False,
                    budget=replace(options.budget, seeds=0))
 

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 PUPPY = "package://puppy/puppy.sdf"
 MOST = 10_000
-"""Of cycles, processes and the like."""
+"""Largest number of cycles, processes and the like."""
 SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
-"""Of the simulation [s]: a walk of 10 s takes a million of the one, and feet sink in with the other."""
+"""Bounds of the simulation's time step [s]: a walk of 10 s takes a million of the shortest, and feet sink in with the longest."""
 
 
 def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy", unless: str | None = PUPPY) -> None:
@@ -53,7 +53,7 @@ def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
 
 
 def _folder(text: str) -> Path:
-    """A folder's path, for argparse; empty is a shell variable that nobody set, not here."""
+    """A folder's path, for argparse; refuses an empty one, which is an unset shell variable rather than the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("expected a folder")
     return Path(text)
@@ -76,6 +76,16 @@ def positive(text: str) -> int:
     return value
 
 
+def seed(text: str) -> int:
+    """A whole number of at least 0, for argparse: random generators take no other."""
+    from workbench.files.numerals import whole_of
+
+    value = whole_of(text)
+    if value is None or value < 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 0, got {text[:40]}")
+    return value
+
+
 def seconds(text: str) -> float:
     """A positive finite number, for argparse."""
     from workbench.files.numerals import number_of
@@ -87,7 +97,8 @@ def seconds(text: str) -> float:
 
 
 def time_step(text: str) -> float:
-    """A step of the simulation [s], for argparse: with longer ones contact and servos mean nothing, shorter ones never end."""
+    """A step of the simulation [s], for argparse: with longer ones contact and servos are meaningless, with shorter ones the
+    simulation never ends."""
     value = seconds(text)
     if not SHORTEST_STEP <= value <= LONGEST_STEP:
         raise argparse.ArgumentTypeError(f"expected {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, got {text[:40]}")

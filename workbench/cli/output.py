@@ -1,4 +1,4 @@
-"""Results written whole or not at all."""
+"""Atomic output: results appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 LEFT = ".workbench-"
-"""Folders that are being filled begin so; then the process that fills them."""
+"""Prefix of folders that are being filled; the number of the process that fills them follows."""
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
 
 
 def _clear(folder: Path) -> None:
-    """Removes what runs that were killed left unfinished in `folder`."""
+    """Removes unfinished output of killed runs from `folder`."""
     for left in folder.glob(f"{LEFT}[0-9]*-*"):
         process = whole_of(left.name.removeprefix(LEFT).partition("-")[0])
         if process is not None and not runs(process):
@@ -68,12 +68,12 @@ def _clear(folder: Path) -> None:
 
 
 def runs(process: int) -> bool:
-    """Whether a process of this number is there."""
+    """Whether a process with this number exists."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except OSError:  # another user's
+    except OSError:  # it belongs to another user
         return True
     return True
 

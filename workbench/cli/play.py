@@ -44,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _percent(text: str) -> int:
-    """10 to 100, for argparse: with less no servo lifts its own leg."""
+    """10 to 100, for argparse: with less, no servo can lift its own leg."""
     value = positive(text)
     if not 10 <= value <= 100:
         raise argparse.ArgumentTypeError(f"expected 10 to 100 percent, got {text[:40]}")
@@ -52,7 +52,7 @@ def _percent(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
+    """Plays and prints how it went; returns 2 if it was stopped, 130 if by Ctrl-C."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.survey import survey
     from workbench.device.play import PlayOptions, finish_log, perform, preflight, reading_plan
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     commands = motion.commands(motion.often(args.cycles, 3))
-    commands, share = commands.slowed(args.slow), args.torque / 100
+    commands, share = commands.slow_down(args.slow), args.torque / 100
     options = PlayOptions(hold=args.hold, torque=share, start_torque=min(share, PlayOptions().start_torque))
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)
@@ -111,7 +111,7 @@ def _write_bag(log: Path, played: Played, offset: float) -> None:
 
 
 def _tell(log: Path, played: Played) -> int:
-    """Why it was stopped first, then what there is; the exit code."""
+    """Prints why it was stopped, then the results; returns the exit code."""
     if played.stopped:
         print(f"workbench play: stopped: {played.stopped}", file=sys.stderr)
     if played.log_problem:

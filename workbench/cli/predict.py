@@ -1,4 +1,4 @@
-"""`workbench predict SESSION --model M.yaml`: takes that nobody has shown the model."""
+"""`workbench predict SESSION --model M.yaml`: predicts takes that the model was not fitted to."""
 
 from __future__ import annotations
 

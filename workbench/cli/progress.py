@@ -26,8 +26,8 @@ def progress_mode(quiet: bool, verbose: bool) -> None:
 
 
 def warn(verb: str, lines: Iterable[str]) -> None:
-    """Lines for stderr, shown once the run turns out to be long, or when it has ended well: where it is refused, the error stands
-    alone."""
+    """Adds warnings for stderr. They are shown once the run turns out to be long, or when it succeeds: if it is refused, only the
+    error is shown."""
     said = [f"workbench {verb}: warning: {line}" for line in lines]
     for line in said:
         LOGGER.warning("%s", line)
@@ -35,14 +35,14 @@ def warn(verb: str, lines: Iterable[str]) -> None:
 
 
 def show_warnings(stream: TextIO | None = None) -> None:
-    """Shows what waits."""
+    """Shows the waiting warnings."""
     for line in _WAITING:
         print(line, file=stream or sys.stderr)
     _WAITING.clear()
 
 
 def forget_warnings() -> None:
-    """Of a run that was refused, or has not begun."""
+    """Drops the waiting warnings of a run that was refused, or has not begun."""
     _WAITING.clear()
 
 
@@ -115,8 +115,8 @@ class Progress:
                     self._show(again=True)
 
     def _show(self, again: bool = False) -> None:
-        """Writes the line: at once where something else is being done (the text up to its first comma), else not too often.
-        `again`: whatever was written."""
+        """Writes the line: at once if the stage (the text up to its first comma) has changed, else not too often. `again`: in any
+        case."""
         what, done = self._now
         now = time.monotonic()
         same = what.partition(",")[0] == self._shown.partition(",")[0]

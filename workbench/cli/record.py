@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Records and says what came."""
+    """Records and prints what was received."""
     from workbench.cli.progress import Progress
     from workbench.device.capture import Recorder, UdpLink, finish, record_take
     from workbench.device.stop import stop_on_signals

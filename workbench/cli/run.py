@@ -1,4 +1,4 @@
-"""`workbench run MOTION`: on the robot and back, in one command."""
+"""`workbench run MOTION`: play, record and compare in one command."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 
 from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_pc_link
 from workbench.cli.check import check_certificate_of
-from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive
+from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive, seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     add_cycles(parser, 10)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the emulated cameras (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="random seed of the emulated cameras (default: 0)")
     parser.add_argument("--force", action="store_true", help="play even if a limit is broken or the certificate is missing")
     parser.add_argument("--diagnose", action="store_true", help="also search for missing physics")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plays, records, compares and says what came of it."""
+    """Plays, records, compares and prints the result."""
     from workbench.api.robot_run import run_by_controller, run_on_robot
     from workbench.cli.diagnose import diagnose_and_report
     from workbench.cli.progress import Progress

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(args: argparse.Namespace) -> int:
-    """Every servo of every family that is known, without a model; 2 where something is wrong with one."""
+    """Lists every servo of every known family, without a model; returns 2 if something is wrong with one."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.listing import list_servos
 
@@ -98,7 +98,7 @@ def _warn(surveys: Sequence[Survey]) -> int:
 
 
 def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
-    """Moves each joint a little and asks the person what moved; 2 where something is wrong."""
+    """Moves each joint a little and asks the user what moved; returns 2 if something is wrong."""
     from workbench.device.play.wiggle import Answers, wiggle
     from workbench.files import InputError
     from workbench.robot import bus_ids
@@ -112,7 +112,7 @@ def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
     answers = Answers()
     for joint in wanted:
         done = wiggle(bus, servos[joint])
-        blocked = ": it went too little; what holds it?" if done.blocked else ""
+        blocked = ": it moved too little; is something blocking it?" if done.blocked else ""
         print(f"servo {done.servo} ({joint}) went {math.degrees(done.went):+.1f} deg and back{blocked}; its torque is off")
         print(f"which joint moved? Enter: {joint}, in the positive direction; -: {joint}, the other way; else its name")
         line = sys.stdin.readline()

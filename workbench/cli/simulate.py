@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulates, writes the table, the figures and the replay, and says how far it went."""
+    """Simulates, writes the table, the figures and the replay, and prints how far it went."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.went import how_it_went

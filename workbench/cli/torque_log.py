@@ -31,7 +31,7 @@ def report_torque_logs(verb: str, files: Sequence[str], model: RobotModel, out: 
     """Writes the torque gap of one or two logs, and report.html, into the folder `out`; prints the tables."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.dynamics.torque_gap import compared, summary, torque_gap
+    from workbench.dynamics.torque_gap import compare_torques, summary, torque_gap
     from workbench.dynamics.torque_log import read_torque_log
     from workbench.files.reading import write_whole
     from workbench.view.report.torque_gap import torque_report
@@ -42,7 +42,7 @@ def report_torque_logs(verb: str, files: Sequence[str], model: RobotModel, out: 
     with output_directory(out) as folder, Progress(verb, stages=("inverse dynamics", "writing")) as progress:
         progress("inverse dynamics")
         gaps = {name: torque_gap(log, model) for name, log in logs.items()}
-        said = compared(logs, gaps, model)
+        said = compare_torques(logs, gaps, model)
         progress("writing")
         told = {name: dict(summary(gap)) for name, gap in gaps.items()}
         content = next(iter(told.values())) if len(told) == 1 else {"format": 1, "logs": told, "compared": said}

@@ -1,4 +1,4 @@
-"""`workbench trim RECORDING --gait MOTION`: a gait made to go straight on the robot that was recorded."""
+"""`workbench trim RECORDING --gait MOTION`: a gait corrected to walk straight on the robot that was recorded."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Reads, trims, certifies, writes, and says what to expect."""
+    """Reads, trims, certifies, writes, and prints what to expect."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.certificate import check_certificate

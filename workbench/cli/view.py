@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Shows it and waits."""
+    """Shows the subject and waits."""
     from workbench.cli.progress import Progress
     from workbench.view.scene.live import open_meshcat, pose_by_sliders, show, show_session, show_take
     from workbench.view.scene.subject import subject_of, take_of

@@ -17,11 +17,11 @@ from workbench.types import Array
 
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 ACROSS = "~"
-"""Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
+"""Separates a joint's name from an axis (x, y or z of the base in neutral) perpendicular to its servo's: "flm~z"."""
 
 
 def joint_of(channel: str) -> str:
-    """The joint that a channel tells of; the channel's own name where it is the body's."""
+    """The joint that a channel observes; for a channel of the body, the channel's own name."""
     return channel.partition(ACROSS)[0]
 
 

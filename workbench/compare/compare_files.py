@@ -29,10 +29,10 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
                   base: Base = "free", progress: Progress = no_progress, n_jobs: int = 2) -> Comparison:
     """Compares two files; a motion is first played `cycles` times on `model`, its base free or fixed.
 
-    Starts are laid over each other: a rollout's is known; a recording is registered against the other file, or, where both are
-    recordings, the first by its own first motion and the second against it. A recording is the side that is "recorded" in
-    the result, wherever it stands; of two recordings, motions or rollouts, A is. With a motion as the other side the
-    numerical floor and the contact spread are known, else not. InputError names the file that does not fit.
+    Both are aligned at their starts: a rollout's start is known; a recording is registered against the other file, or, if both
+    are recordings, the first by its own first motion and the second against it. In the result a recording is the "recorded" side,
+    whichever argument it was; of two recordings, motions or rollouts, A is. The numerical floor and the contact spread are known
+    only if the other side is a motion. InputError names the file that does not fit.
     """
     began = time.monotonic()
     config = config or SimulationConfig(engine="drake")
@@ -59,8 +59,8 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
             assert predicted is not None
             commands = recording.commands or predicted.commands
             t = register_take(replace(recording, commands=commands), predicted, None)
-            takes = [t.recorded, t.observed(predicted)]
-            finer, other = (tuple(t.observed(r) for r in rs) for rs in (finer, other))
+            takes = [t.recorded, t.observe(predicted)]
+            finer, other = (tuple(t.observe(r) for r in rs) for rs in (finer, other))
     recorded, simulated = takes
     assert recorded is not None
     assert simulated is not None
@@ -75,11 +75,11 @@ def recorded_take(path: str | Path, model: RobotModel, base: Base = "free") -> T
 
 
 def _by_first_motion(read: ReadTake) -> RegisteredTake:
-    """A recording of which nothing is known but itself: its start is where its first joint leaves rest."""
+    """A recording without commands or a counterpart: it starts when its first joint leaves rest."""
     if read.recording.sensing == "encoders" or read.commands is not None:
         return register_take(read, None, None)
     start = float(read.recording.time[0])
-    for _ in range(2):  # the zero is taken before the start, and the start found from zeroed angles
+    for _ in range(2):  # zeros are taken before the start, but the start is found from zeroed angles: hence twice
         take = register_take(replace(read, spec=replace(read.spec, starts_at=start)), None, None).recorded
         start = _first_motion(take)
     return register_take(replace(read, spec=replace(read.spec, starts_at=start)), None, None)
@@ -96,7 +96,7 @@ def _first_motion(take: Take, least: float = np.deg2rad(1.0)) -> float:
 
 
 def _bridge_gaps(take: Take) -> Take:
-    """The take with its gaps filled straight, for something else to be laid over it."""
+    """The take with its gaps filled linearly, so that another take can be aligned with it."""
     q = take.q.copy()
     for column in q.T:
         seen = np.isfinite(column)
@@ -113,6 +113,6 @@ def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
 
 
 def _run(path: Path, model: RobotModel, cycles: int | None, base: Base, beside: ReadTake | None) -> Run:
-    """A motion's run, as long as the recording with which it is compared."""
+    """The simulation of a motion, as long as the recording with which it is compared."""
     commands = load_motion(path, model).commands(cycles)
     return Run(path.stem, model, commands, commands.end if beside is None else beside.duration, base)

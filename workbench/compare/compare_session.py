@@ -50,11 +50,10 @@ class Run:
 def compare_session(session: Session, config: SimulationConfig | None = None, *, progress: Progress = no_progress,
                     n_jobs: int = 2, finer_steps: Literal["judged", "drake"] = "judged") -> Comparison:
     """Simulates, registers and compares every take. config: of the nominal rollout, its base set by each take; by default
-    Drake's. finer_steps: those that give the numerical floor are the compiled station's where that does as Drake does at the
-    nominal step ("judged"), or Drake's in any case.
-
-    A damaged take is left out and named in the result; InputError where none remains. The rollouts of all takes, steps and
-    contact models run over `n_jobs` processes. progress: called with (what, share done or None).
+    Drake's. finer_steps: "judged" computes the finer steps of the numerical floor with the compiled station, if that agrees with
+    Drake at the nominal step; else Drake computes them all. A damaged take is left out and named in the result; InputError if
+    none remains. The rollouts of all takes, steps and contact models are spread over `n_jobs` processes. progress: called with
+    (what, share done or None).
     """
     began = time.monotonic()
     config = config or SimulationConfig(engine="drake")
@@ -101,8 +100,8 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
 
 def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int = 2, progress: Progress = no_progress
                     ) -> list[Rollouts]:
-    """As `roll_out`, but for the finer steps of runs of which the compiled station covers the nominal one and agrees with Drake:
-    these are the compiled station's."""
+    """Like `roll_out`, but the compiled station computes the finer steps of each run in which it supports the nominal step and
+    agrees with Drake there."""
     done = roll_out(runs, config, progress=progress, n_jobs=n_jobs, finer=False)
     progress("simulating finer steps", None)
     nominal = [_job(run, replace(config, base=run.base, engine="auto")) for run in runs]
@@ -118,7 +117,7 @@ def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: in
 
 
 def _longest_first(jobs: Sequence[Job], n_jobs: int, progress: Callable[[int, int], None] | None = None) -> list[Take]:
-    """The takes in the order of the jobs, of which the longest begin first, so that no core waits for one at the end."""
+    """The takes in the order of the jobs. The longest jobs are started first, so that no core waits for one at the end."""
     order = sorted(range(len(jobs)), key=lambda k: -_cost(jobs[k]))
     done = dict(zip(order, simulate_batch([jobs[k] for k in order], n_jobs, progress)))
     return [done[k] for k in range(len(jobs))]
@@ -145,8 +144,8 @@ def _apart(one: Take, other: Take) -> float:
 
 
 def _instants(run: Run, config: SimulationConfig) -> Array | None:
-    """Of the log, where a floor is known by angles alone, as of a held robot: what tells no torques may be the compiled station's
-    where servos are switched off, too."""
+    """The log's instants, if angles alone determine the floor, as for a held robot: without torques, the compiled station also
+    supports servos that are switched off."""
     if run.base != "fixed" or run.duration is None:
         return None
     lead = 0.0 if run.start is not None else COMPARE.lead
@@ -155,7 +154,7 @@ def _instants(run: Run, config: SimulationConfig) -> Array | None:
 
 
 def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:
-    """What made a result."""
+    """The versions, model, seed and options behind a result."""
     from dataclasses import asdict
     from importlib.metadata import version
 
@@ -164,7 +163,7 @@ def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> d
 
 
 def _cost(job: Job) -> float:
-    """Steps to take; a surface contact costs about twice a point contact."""
+    """Number of steps; hydroelastic contact counts double, as it takes about twice as long."""
     steps = (job.duration or 0.0) / (job.config.time_step or 1e-4)
     return steps * (2 if job.config.contact == "hydroelastic" else 1)
 
@@ -176,6 +175,6 @@ def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
 
 def _compare(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:
     compared = compare_takes(
-        t.recorded, t.observed(rollouts.nominal), t.model, finer=[t.observed(r) for r in rollouts.finer],
-        other_contact=[t.observed(r) for r in rollouts.other_contact], noise=noise)
+        t.recorded, t.observe(rollouts.nominal), t.model, finer=[t.observe(r) for r in rollouts.finer],
+        other_contact=[t.observe(r) for r in rollouts.other_contact], noise=noise)
     return replace(compared, starts_at_sigma=t.measurement.starts_at_sigma)

@@ -1,4 +1,4 @@
-"""Two takes side by side: how far they differ, and how much of that is noise, numerics or the contact model."""
+"""Compares two takes: how far they differ, and how much of that is noise, numerics or the contact model."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def compare_takes(
     recorded: Take, simulated: Take, model: RobotModel, *, finer: Sequence[Take] = (), other_contact: Sequence[Take] = (),
     noise: Noise | None = None,
 ) -> TakeComparison:
-    """Compares any two takes of one robot; the second is brought onto the first one's clock where it is not there already.
+    """Compares any two takes of one robot; the second is resampled onto the first one's clock if necessary.
 
     finer: `simulated` again with the step halved and quartered; other_contact: with the other contact model; both observed as
-    `simulated` was. noise: of the capture, if known better than from this take's rest. InputError where the takes have no joint
-    in common.
+    `simulated` was. noise: of the capture, if known better than from this take's rest. InputError if the takes have no joint in
+    common.
     """
     if not np.isfinite(recorded.starts_at):
         recorded = replace(recorded, starts_at=float(recorded.time[0]))
@@ -59,8 +59,8 @@ class Noise:
 
 
 def noise_of(takes: Sequence[Take]) -> Noise:
-    """The noise of a capture from all takes made with it, each about its own rest; of logs no less than what their takes say of
-    their angles: they need not begin with a rest, and at rest a count does not change."""
+    """The noise of a capture from all its takes, each about its own rest. For logs it is at least the angles' stated standard
+    deviation: logs need not begin at rest, and at rest an encoder's count does not change."""
     joints = {}
     for joint in dict.fromkeys(j for t in takes for j in t.joints):
         seen = [t for t in takes if joint in t.joints]
@@ -86,7 +86,7 @@ def align(take: Take, reference: Take) -> Take:
 
 
 def _zero(take: Take) -> Take:
-    """Zero at rest; a take without a rest, at the first angle seen."""
+    """The angles at rest; for a take without a rest, the first ones seen."""
     take = take.zeroed_at_rest()
     if take.zeroed:
         return take
@@ -97,7 +97,7 @@ def _zero(take: Take) -> Take:
 
 @dataclass(frozen=True)
 class _Takes:
-    """A recording, its rollout, and the rollouts that say how sure that one is; all on one clock."""
+    """A recording, its rollout, and the rollouts that show how certain that one is; all on one clock."""
 
     recorded: Take
     simulated: Take
@@ -105,7 +105,7 @@ class _Takes:
     other: Sequence[Take]
 
     def pair(self, of: Callable[[Take], float]) -> Pair | None:
-        """`of` the base's motion in each take; None where one of them has no base pose."""
+        """`of` applied to the base's motion in each take; None if one of them has no base pose."""
         if any(t.p_WB is None or t.quat_WB is None for t in (self.recorded, self.simulated, *self.finer, *self.other)):
             return None
         simulated = of(self.simulated)
@@ -159,12 +159,12 @@ def _path(take: Take) -> Array | None:
 
 def _displacement(take: Take) -> Array:
     assert take.p_WB is not None
-    return metrics.travelled(take.p_WB, take.since_start)
+    return metrics.displacement(take.p_WB, take.since_start)
 
 
 def _heading_change(take: Take) -> float:
     assert take.quat_WB is not None
-    return metrics.turned(take.quat_WB, take.since_start)
+    return metrics.heading_change(take.quat_WB, take.since_start)
 
 
 def _walking(take: Take) -> NDArray[np.bool_]:
@@ -173,13 +173,13 @@ def _walking(take: Take) -> NDArray[np.bool_]:
 
 
 def _speed(take: Take) -> float:
-    """Straight-line distance in the plane over the commands' time [m/s]."""
+    """Straight-line distance in the plane over the duration of the commands [m/s]."""
     use = _walking(take)
     if not use.any():
         return NAN
     assert take.p_WB is not None
     upto = np.asarray(take.since_start <= take.since_start[use][-1])
-    return float(np.linalg.norm(metrics.travelled(take.p_WB[upto], take.since_start[upto])[:2]) / take.since_start[use][-1])
+    return float(np.linalg.norm(metrics.displacement(take.p_WB[upto], take.since_start[upto])[:2]) / take.since_start[use][-1])
 
 
 def _smoothness(take: Take) -> float:

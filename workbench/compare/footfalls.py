@@ -16,10 +16,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class FootPhases:
-    """When one foot stands. stance: (N,) of the take's frames. known: (N,) where the foot was seen.
+    """When one foot is on the ground. stance: (N,) for each of the take's frames. known: (N,) where the foot was seen.
 
-    falls: times at which it touches down [s], on the take's clock. duty: share of the time from the first command to the
-    last command's end (or the take's) in which it stands.
+    falls: times at which it touches down [s], on the take's clock. duty: share of the time from the first command to the last
+    command's end (or the take's) in which it stands.
     """
 
     stance: NDArray[np.bool_]
@@ -79,7 +79,7 @@ def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
 
 
 def _rest_height(take: Take, heights: dict[str, Array]) -> float:
-    """Height of the base link's origin over the feet before the first command (or in the first frames) [m]."""
+    """Height of the base link's origin above the feet before the first command (or in the first frames) [m]."""
     assert take.p_WB is not None
     use = take.resting if take.resting.any() else np.arange(len(take)) < 10
     over = [np.nanmedian(take.p_WB[use, 2] - z[use]) for z in heights.values() if np.isfinite(z[use]).any()]
@@ -97,7 +97,7 @@ def _phases(take: Take, stance: NDArray[np.bool_], known: NDArray[np.bool_]) -> 
 
 
 def _without_chatter(stance: NDArray[np.bool_], time: Array) -> NDArray[np.bool_]:
-    """Phases below SHORTEST, the shortest first, are joined to their neighbours; the first and the last phase stay."""
+    """Joins phases below SHORTEST to their neighbours, the shortest first; the first and the last phase are kept."""
     stance = stance.copy()
     while True:
         edges = np.concatenate([[0], np.flatnonzero(np.diff(stance.astype(int))) + 1, [len(stance)]])

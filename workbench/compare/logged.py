@@ -1,4 +1,4 @@
-"""How a session's servo logs were logged, as they themselves tell: found before anything is fitted."""
+"""How a session's servo logs were logged, found from the logs themselves before anything is fitted."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from workbench.compare.session_takes import ReadTake
 from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
 
 _CHANGED = ("taken out", "left out", "set right", "evidence ends", "turned back", "undone")
-"""How a line ends that reports a change of the log, and not only a doubt."""
+"""Endings of lines that report a change to the log rather than only a doubt."""
 
 
 def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
-    """For provenance: by take notes and the readings that were set aside, and by joint the law that the register of duty tells;
-    empty where there is nothing to say."""
+    """For provenance: by take, the notes and the readings that were set aside; by joint, the servo law read from the duty
+    register. Empty if there is nothing to report."""
     notes = {t.spec.name: list(t.recording.notes) for t in takes if t.recording.notes}
     laws = {joint: str(law) for joint, law in register_laws(takes).items()}
     found: dict[str, Any] = {"logs": notes} if notes else {}
@@ -25,12 +25,12 @@ def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
 
 
 def set_aside(problems: Sequence[str]) -> list[str]:
-    """Those of a recording's problems that say which readings were corrected, or excluded from the evidence."""
+    """The problems of a recording that report corrected readings, or readings excluded from the evidence."""
     return [text for text in problems if any(word in text for word in _CHANGED)]
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:
-    """By joint, the servo's law as its register of duty tells it over all logs, where they have one."""
+    """By joint, the servo law read from the duty register of all logs, if they have one."""
     logs: dict[str, list[RegisterLog]] = {}
     for t in takes:
         channels = t.recording.channels

@@ -1,4 +1,4 @@
-"""Measures of one take, and of the difference of two, on plain arrays. SI and radians; NaN where undefined."""
+"""Measures of one take, and of the difference between two, on plain arrays. SI and radians; NaN where undefined."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def rms_distance(a: Array, b: Array, use: Mask) -> float:
 def noise_at_rest(rests: Sequence[Array], least: int = 5) -> Array:
     """RMS about the mean of channels at rest, (n,); NaN below `least` frames. Unbiased in the variance.
 
-    rests: frames at rest (N_k, n) of each take k; each has its own mean, the noise is one for all. Half a second of rest tells
-    noise to a tenth, so that takes of one capture are better pooled.
+    rests: frames at rest (N_k, n) of each take k; each has its own mean, the noise is one for all. Half a second of rest gives
+    the noise to 10 %, so it is better to pool the takes of one capture.
     """
     squares, freedom = np.zeros(rests[0].shape[1]), np.zeros(rests[0].shape[1])
     for x in rests:
@@ -50,20 +50,19 @@ def correlation(a: Array, b: Array, use: Mask) -> Array:
     both = use[:, None] & np.isfinite(a) & np.isfinite(b)
     count = np.maximum(both.sum(axis=0), 1)
 
-    def centred(x: Array) -> Array:
+    def centre(x: Array) -> Array:
         x = np.where(both, x, 0.0)
         return np.where(both, x - x.sum(axis=0) / count, 0.0)
 
-    x, y = centred(a), centred(b)
+    x, y = centre(a), centre(b)
     spread = np.sqrt((x * x).sum(axis=0) * (y * y).sum(axis=0))
     return np.asarray(np.divide((x * y).sum(axis=0), spread, out=np.full(len(spread), np.nan), where=spread > 1e-12))
 
 
 def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array, most: float = 0.2) -> Array:
-    """Time by which column a_j comes later than b_j [s], (n,): the shift of least RMS difference.
-
-    Between frames by a parabola. NaN for a column of b that moves less than 5 times `noise` (n,) (NaN: 1e-3 rad), or whose
-    best shift lies at the edge of +-`most` [s]. Both on the same `time` (N,).
+    """Time by which column a_j lags b_j [s], (n,): the shift of least RMS difference, interpolated between frames by a parabola.
+    NaN for a column of b that moves less than 5 times `noise` (n,) (NaN: 1e-3 rad), or whose best shift lies at the edge of
+    +-`most` [s]. Both on the same `time` (N,).
     """
     shown = use[:, None] & np.isfinite(b)
     moves = np.where(shown, b, -np.inf).max(axis=0) - np.where(shown, b, np.inf).min(axis=0)
@@ -99,7 +98,7 @@ def heading(quat_WB: Array) -> Array:
     return out
 
 
-def travelled(p_WB: Array, since_start: Array) -> Array:
+def displacement(p_WB: Array, since_start: Array) -> Array:
     """Displacement (3,) [m] from the rest before the first command to the last frame seen; NaN where neither is."""
     seen = np.isfinite(p_WB).all(axis=1)
     before, after = seen & (since_start < 0), seen & (since_start >= 0)
@@ -109,9 +108,9 @@ def travelled(p_WB: Array, since_start: Array) -> Array:
     return np.asarray(p_WB[after][-1] - first)
 
 
-def turned(quat_WB: Array, since_start: Array) -> float:
+def heading_change(quat_WB: Array, since_start: Array) -> float:
     """Change of heading [rad] from the rest before the first command to the last frame seen, whole turns counted."""
-    return float(travelled(np.column_stack([heading(quat_WB), np.zeros((len(quat_WB), 2))]), since_start)[0])
+    return float(displacement(np.column_stack([heading(quat_WB), np.zeros((len(quat_WB), 2))]), since_start)[0])
 
 
 def speed(time: Array, x: Array, window: float = 0.1) -> Array:
@@ -132,9 +131,9 @@ def speed(time: Array, x: Array, window: float = 0.1) -> Array:
 def smoothness(time: Array, speed: Array, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float:
     """Spectral arc length (SPARC) of a speed profile: minus the length of its normalised spectrum; 0 is smoothest.
 
-    S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet: On the analysis of movement smoothness. J.
-    NeuroEng. Rehabil. 12:112, 2015, with that paper's cutoff [Hz], amplitude threshold and zero padding. Unlike jerk it
-    bears a recording's noise. NaN for a profile that is zero or shorter than four samples.
+    S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet: On the analysis of movement smoothness. J. NeuroEng.
+    Rehabil. 12:112, 2015, with that paper's cutoff [Hz], amplitude threshold and zero padding. Unlike jerk, it is robust to a
+    recording's noise. NaN for a profile that is zero or shorter than four samples.
     """
     if len(speed) < 4 or not np.isfinite(speed).all() or not np.any(speed):
         return float("nan")

@@ -1,4 +1,4 @@
-"""Every number that takes are compared with: unit, meaning and reason in one place."""
+"""Every threshold of a comparison, with unit, meaning and reason, in one place."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class CompareOptions:
     shortest: float = 0.03
     """Stance or swing shorter than this is chatter, not a step [s]."""
     fell_tilt: float = radians(60.0)
-    """A base that leans further lies [rad]."""
+    """A base that leans further counts as fallen [rad]."""
     fell_height: float = 0.5
-    """Of its height at rest, below which a base lies."""
+    """Share of its height at rest below which a base counts as fallen."""
     engines_apart: float = 1e-6
-    """Rollouts of one model by Drake and by the compiled station that differ by more [rad, m] are not taken for the same: those
-    of a walk differed by 3e-14 rad."""
+    """Largest difference [rad, m] at which rollouts by Drake and by the compiled station count as equal: those of a walk
+    differed by 3e-14 rad."""
     camera_rate: float = 120.0
     """Frames per second of the virtual robot's cameras."""
 
@@ -36,17 +36,17 @@ class FileLimits:
     """Limits beyond which a value in a file is probably a mistake of its author."""
 
     most_seconds: float = 86_400.0
-    """Of a start and of a prediction [s]: a day."""
+    """Largest time of a start, and of a prediction [s]: a day."""
     most_frames: int = 10_000_000
-    """Of a prediction: hours at any camera's rate."""
+    """Most frames of a prediction: hours at any camera's rate."""
     smallest_motion: float = radians(1.6)
-    """No motion of a robot is as small [rad]; in radians, it is a right angle."""
+    """A motion of a robot is larger than this [rad]; a value in radians read as degrees is not (a right angle is 1.6)."""
     largest_angle: float = radians(200.0)
-    """No servo's goal lies as far from its centre [rad]."""
+    """No servo's goal is this far from its centre [rad]."""
     longest: float = 600.0
-    """A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
+    """A longer take or motion is usually a mistake [s]: simulating it takes hours."""
     slowest_pose: float = 8.0
-    """Between poses of a motion, in the median [s]: in milliseconds, most are further apart; no gait or test rests as long."""
+    """Median time between a motion's poses [s] above which the times are probably milliseconds; no gait or test rests as long."""
     fewest_frames: int = 20
     """Of a take."""
 

@@ -43,16 +43,16 @@ class TakeSpec:
     load: KnownLoad | None = None
 
     def robot(self, model: RobotModel) -> RobotModel:
-        """A model as it was in this take."""
+        """The model as it was in this take."""
         return _as_it_was(model, self)
 
     @property
     def conditions(self) -> str:
-        """The same for takes in which the robot was the same."""
+        """A key that is equal for takes in which the robot was the same."""
         return repr((sorted(self.servos.items()), self.load))
 
     def commands(self, model: RobotModel) -> Commands | None:
-        """What went out on the bus; None where only the recording knows."""
+        """The commands sent on the bus; None if only the recording holds them."""
         return None if self.motion is None else load_motion(self.motion, model).commands(self.cycles)
 
 
@@ -79,7 +79,7 @@ def _as_it_was(model: RobotModel, entry: TakeSpec | PredictSpec) -> RobotModel:
 
 @dataclass(frozen=True)
 class Session:
-    """One robot, one day of recordings. model: the nominal robot. registers: what its servos' registers say, where they were
+    """One robot, one day of recordings. model: the nominal robot. registers: contents of its servos' registers, if they were
     read. yaw: of the robot's first heading in the capture's axes, positive to the left [rad]; None: found from the takes. All
     files named exist; all names fit the model."""
 
@@ -95,7 +95,7 @@ class Session:
         return _as_it_was(model or self.model, take)
 
     def with_model(self, model: RobotModel) -> Session:
-        """The same recordings beside another model of the robot; InputError where that is another robot."""
+        """The same recordings with another model of the robot; InputError if it is a different robot."""
         if model.joints != self.model.joints or model.kinematics.links != self.model.kinematics.links:
             raise InputError(model.description, f"expected the links and joints of the robot in {self.path}")
         return replace(self, model=model)
@@ -180,7 +180,7 @@ def _entry_name(f: Fields) -> str:
 
 
 def _base(f: Fields, model: RobotModel) -> Base:
-    """free or fixed; where the take does not say: as the robot usually is."""
+    """"free" or "fixed"; as is usual for the robot if the take does not say."""
     said = f.text("base", choices=("free", "fixed"))
     base: Base = model.usual_base if said is None else "fixed" if said == "fixed" else "free"
     try:

@@ -13,8 +13,8 @@ from workbench.robot.model_file import robot_content
 
 
 def write_session(folder: Path, model: RobotModel, takes: Sequence[Mapping[str, Any]], registers: str | None = None) -> Path:
-    """Writes session.yaml (docs/formats.md, section 1), whole or not at all. takes: as they stand there, files relative to the
-    folder; registers: the file's name. The model's effects are left out: the robot is taken for the nominal one."""
+    """Writes session.yaml (docs/formats.md, section 1), whole or not at all. takes: as in session.yaml, with files relative to
+    the folder; registers: the file's name. The model's effects are omitted: the session describes the nominal robot."""
     content = {"format": 1} | robot_content(model, folder)
     if registers is not None:
         content["registers"] = registers

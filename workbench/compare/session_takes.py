@@ -45,7 +45,8 @@ class ReadTake:
 
     @property
     def duration(self) -> float:
-        """Time from the first command to the recording's end, if it began with the recording [s]."""
+        """Time from the first command to the recording's end [s], assuming that the first command came when the recording
+        began."""
         logged = self.recording.sensing == "encoders"
         begin = first_command(self.recording, self.spec.starts_at) if logged else self.spec.starts_at or 0.0
         return float(self.recording.time[-1] - begin)
@@ -66,15 +67,16 @@ class ReadTake:
 
 @dataclass(frozen=True)
 class RegisteredTake(ReadTake):
-    """A take in the model's frame. recorded: zeroed at rest as seen; measurement: how a rollout is looked at in the same way."""
+    """A take in the model's frame. recorded: zeroed at rest, as the cameras see it; measurement: how to observe a rollout in the
+    same way."""
 
     measurement: Measurement
     recorded: Take
 
-    def observed(self, rollout: Take, model: RobotModel | None = None) -> Take:
-        """A rollout of this take as the recording would show it: on its clock, zeroed in the same way (a log is not).
+    def observe(self, rollout: Take, model: RobotModel | None = None) -> Take:
+        """A rollout of this take as the recording would show it: on its clock, and zeroed in the same way (logs are not zeroed).
 
-        model: the robot that was simulated, where its effects are not this take's: some change what cameras see."""
+        model: the robot that was simulated, if its effects differ from this take's: some effects change what cameras see."""
         if not self.recorded.zeroed:
             return align(rollout.as_logged(), self.recorded)
         model = model or self.model
@@ -82,8 +84,8 @@ class RegisteredTake(ReadTake):
 
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
-    """All recordings of a session, and those left out with the reason. InputError where none remains, or where a recording has
-    an asset to which the session gives no link, or something was mistyped: that is an error, not a damaged take."""
+    """All recordings of a session, and those left out with the reason. InputError if none remains. An asset without a link in the
+    session, or a mistyped name, is an error (InputError) rather than a damaged take."""
     read: list[ReadTake] = []
     left: list[tuple[str, str]] = []
     for spec in session.takes:
@@ -107,8 +109,8 @@ def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
 
 
 def readable(path: Path, model: RobotModel) -> Recording:
-    """A recording that can be compared: InputError where it cannot be read, is hardly one, or has neither rigid bodies that were
-    seen nor joints."""
+    """Reads a recording that can be compared: InputError if it cannot be read, has too few frames, or has neither visible rigid
+    bodies nor joints."""
     recording = read_recording(path)
     if len(recording.time) < FILES.fewest_frames:
         raise InputError(path, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
@@ -123,7 +125,7 @@ def readable(path: Path, model: RobotModel) -> Recording:
 
 
 def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) -> LeftOut:
-    """`left_out`; InputError where no take is left."""
+    """Returns `left_out`; InputError if no take remains."""
     if takes:
         return left_out
     if not left_out:
@@ -159,7 +161,7 @@ def capture_yaw(session: Session, takes: Sequence[ReadTake]) -> float | None:
 
 
 def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:
-    """Registers one take against a simulation (or another recording). InputError where that is impossible."""
+    """Registers one take against a simulation (or another recording). InputError if that is impossible."""
     spec, model, recording, commands = take.spec, take.model, take.recording, take.commands
     measurement = register(recording, model, commands, predicted, spec.starts_at, yaw, spec.base)
     recorded = take_from_recording(recording, measurement, model, name=spec.name, base=spec.base)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.compare.metrics import heading, turned
+from workbench.compare.metrics import heading, heading_change
 from workbench.compare.options import COMPARE
 from workbench.recording import quaternions as quat
 from workbench.recording.take import Take
@@ -27,5 +27,5 @@ def how_it_went(take: Take) -> str:
     up = quat.matrix(take.quat_WB)[:, 2, 2]
     fell = np.flatnonzero((up < np.cos(COMPARE.fell_tilt)) | (take.p_WB[:, 2] < COMPARE.fell_height * take.p_WB[first, 2]))
     ending = f"; fell at {take.since_start[fell[0]]:.2f} s" if len(fell) else "; did not fall"
-    turn = float(np.rad2deg(turned(take.quat_WB, take.since_start)))
+    turn = float(np.rad2deg(heading_change(take.quat_WB, take.since_start)))
     return f"went {forward:+.3f} m forward{speed} and {left:+.3f} m to the left, turned {turn:+.1f} deg{ending}"

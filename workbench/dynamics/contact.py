@@ -7,9 +7,9 @@ import numpy as np
 from workbench.types import Array
 
 STICKING = 0.02
-"""Slip [m/s] about which friction turns from any direction to against the slip."""
+"""Slip [m/s] around which friction changes from any direction to opposing the slip."""
 AGAINST_SLIP = 100.0
-"""How much dearer force is that does not obey the slip: it is used only where the wrench asks for it."""
+"""Relative cost of force that does not oppose the slip: it is used only if the wrench requires it."""
 _CHUNK = 4096
 _ITERATIONS, _HALVINGS = 60, 30
 

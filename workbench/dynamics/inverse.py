@@ -31,7 +31,7 @@ second spans an impact of a simulated foot."""
 REGULARISATION = 1e-6
 """Cost of contact force against residual, both over the weight: the tolerance of the residual, as a share of the weight."""
 DRAWS = 8
-"""Noisy copies of a take from which the uncertainties come."""
+"""Number of noisy copies of a take from which uncertainties are computed."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from workbench.dynamics.trajectory import RobotTrajectory
-from workbench.effects.apply import physics_of, resolved
+from workbench.effects.apply import physics_of, resolve
 from workbench.files import InputError
 from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, RobotModel
@@ -61,7 +61,7 @@ class Machine:
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         parser = Parser(plant)
         ConfigureParser(parser)
-        loaded = model.with_effects([spec for effect, spec, _ in resolved(model) if effect.layer == "inertia"])
+        loaded = model.with_effects([spec for effect, spec, _ in resolve(model) if effect.layer == "inertia"])
         self.left_out = tuple(spec.effect for spec in model.effects if spec not in loaded.effects)
         description = physics_of(loaded).description
         with quiet_drake():

@@ -1,4 +1,4 @@
-"""What inverse dynamics finds, and the table of it."""
+"""The result of inverse dynamics, and its table."""
 
 from __future__ import annotations
 
@@ -108,23 +108,23 @@ def load_inverse_dynamics(path: str | Path) -> InverseDynamicsResult:
     joints = tuple(c.removeprefix("position.") for c in table if c.startswith("position."))
     feet = tuple(dict.fromkeys(c.split(".")[1] for c in table if c.startswith("contact.")))
 
-    def stacked(names: list[str]) -> Array:
+    def stack(names: list[str]) -> Array:
         missing = [n for n in names if n not in table]
         if missing:
             raise InputError(path, f"line 4: column '{missing[0]}' is missing")
         return np.column_stack([table[n] for n in names])
 
     def wrench(what: str, suffix: str = "") -> Array:
-        return stacked([f"{what}.{part}{suffix}" for part in _WRENCH])
+        return stack([f"{what}.{part}{suffix}" for part in _WRENCH])
 
     if "time" not in table or not joints:
         raise InputError(path, "line 4: expected the columns 'time' and 'position.JOINT'")
-    values = {key: stacked([f"{kind}.{j}" for j in joints]) / _factor(kind) for kind, key in _JOINT_COLUMNS.items()}
+    values = {key: stack([f"{kind}.{j}" for j in joints]) / _factor(kind) for kind, key in _JOINT_COLUMNS.items()}
     return InverseDynamicsResult(
         name=name, base=base, time=table["time"], joints=joints, **values,
-        contact={f: stacked([f"contact.{f}.{axis}" for axis in "xyz"]) for f in feet},
+        contact={f: stack([f"contact.{f}.{axis}" for axis in "xyz"]) for f in feet},
         base_wrench_residual=wrench("residual"), residual_sigma=wrench("residual", ".sigma"), support=wrench("support"),
-        torque_sigma=stacked([f"torque.{j}.sigma" for j in joints]), loads=loads, problems=problems)
+        torque_sigma=stack([f"torque.{j}.sigma" for j in joints]), loads=loads, problems=problems)
 
 
 def _wrenches(result: InverseDynamicsResult) -> list[tuple[str, str, Array]]:

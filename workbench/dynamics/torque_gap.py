@@ -14,9 +14,9 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.types import Array
 
 _WINDOW = 0.1
-"""Over which angles are smoothed and differentiated [s]."""
+"""Window in which angles are smoothed and differentiated [s]."""
 _ROWS = 300
-"""Rows that are evaluated, evenly chosen."""
+"""Number of rows that are evaluated, evenly chosen."""
 _PROBE = 0.1
 """Mass [kg] and distance [m] of the probes of a load."""
 
@@ -100,7 +100,7 @@ def torque_gap(log: TorqueLog, model: RobotModel, link: str | None = None) -> To
                      required[:, columns])
 
 
-def compared(logs: Mapping[str, TorqueLog], gaps: Mapping[str, TorqueGap], model: RobotModel) -> str:
+def compare_torques(logs: Mapping[str, TorqueLog], gaps: Mapping[str, TorqueGap], model: RobotModel) -> str:
     """The additional load of the second of two logs against the first, in a sentence, both weighed on the link that explains
     the larger gap: errors of the model, equal in both, cancel. Empty for one log, or where neither shows a load."""
     if len(logs) != 2:

@@ -1,4 +1,4 @@
-"""A model with its effects worked in: what stations are built from, and motions played with."""
+"""Applies a model's effects: the result is what stations are built from and motions are played with."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from workbench.cache import Cache
 from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
-from workbench.effects.schedules import delayed
+from workbench.effects.schedules import delay_commands
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
@@ -21,7 +21,7 @@ from workbench.servo import ServoLaw, ServoTerm, nominal_terms
 from workbench.types import Array
 
 KEPT_BUILDS = 64
-"""Changed descriptions that are kept: more than a fit looks at side by side."""
+"""Number of changed descriptions that are kept: more than a fit compares at once."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,11 @@ class Physics:
 
     @property
     def servo_terms(self) -> tuple[ServoTerm, ...]:
-        """All that servos do beyond constants, by the nominal law and by effects."""
+        """All behaviour of the servos beyond constants, from the nominal law and from effects."""
         return (*nominal_terms(self.law), *self.terms)
 
 
-def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
+def resolve(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
     """Each effect of a model with its spec and its values in SI, checked; InputError names the problem."""
     for spec in model.effects:
         effect = effect_named(spec.effect)
@@ -68,7 +68,7 @@ def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, 
 def law_of(model: RobotModel) -> ServoLaw:
     """The servos' law alone, effects applied in their order: in a fraction of the time of `physics_of`."""
     law = ServoLaw.of([model.servo(j) for j in model.joints])
-    for effect, spec, values in resolved(model):
+    for effect, spec, values in resolve(model):
         law = effect.law(law, _columns(model, spec), values)
     return law
 
@@ -83,7 +83,7 @@ def physics_of(model: RobotModel) -> Physics:
     terms: list[ServoTerm] = []
     changes: list[tuple[Effect, EffectSpec]] = []
     retimed = any(model.servo(j).goal_delay > 0 for j in model.joints)
-    for effect, spec, values in resolved(model):
+    for effect, spec, values in resolve(model):
         columns = _columns(model, spec)
         law = effect.law(law, columns, values)
         if type(effect).servo_term is not Effect.servo_term:
@@ -135,14 +135,14 @@ def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
     delays its goals still lets go at once: the duty register of an STS3215 is zero in the row that switches it off."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
-        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
-    for effect, spec, values in resolved(model):
+        commands = delay_commands(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
+    for effect, spec, values in resolve(model):
         commands = effect.commands(commands, spec.where, values, model)
     return commands
 
 
 def apply_to_measurement(measurement: Measurement, model: RobotModel) -> Measurement:
     """How the cameras look at a robot with these effects."""
-    for effect, spec, _ in resolved(model):
+    for effect, spec, _ in resolve(model):
         measurement = effect.measurement(measurement, spec)
     return measurement

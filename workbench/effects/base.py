@@ -30,17 +30,17 @@ Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
-"""Effects that do nearly the same, until data separate them: where no member is sure, the family may be."""
+"""Effects that act almost alike until data separate them: if no member is certain, the family may be."""
 Tie = Literal["gravity against torque", "less torque at full duty"]
 """Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so that only the
 ratio of gravity to torque is known; and a torque that saturates, bends or sags with duty has the same effect."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
-"""Ways to read an effect off the recordings (workbench/identify/estimators)."""
+"""Ways to estimate an effect directly from the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
 REACH = 2.0
-"""Multiple of the value that one in a hundred exceeds: larger values are implausible."""
+"""Values beyond this multiple of the one that one in a hundred exceeds are implausible."""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 
@@ -77,7 +77,7 @@ class Parameter:
         return BEYOND * neutral if near else self.typical
 
     def distance(self, value: float, neutral: float) -> float:
-        """How far a value is from neutral: of a ratio the size of its logarithm."""
+        """Distance of a value from neutral; for a ratio, the absolute value of its logarithm."""
         return abs(math.log(value / neutral)) if self.logarithmic else abs(value - neutral)
 
 
@@ -104,9 +104,9 @@ class Effect:
     places: ClassVar[tuple[Place, ...]]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     title: ClassVar[str] = ""
-    """For a person, where that is not the name with blanks for underscores."""
+    """Readable name, if it is not the name with spaces for underscores."""
     family: ClassVar[Family | None] = None
-    """The effects with which it is easily confused; None: it has no family."""
+    """The family of effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
     """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
     needs_steady_load: ClassVar[bool] = False
@@ -128,6 +128,9 @@ class Effect:
     """Effects at the same joint or link that are special cases of it, and so are never added to it."""
     tied: ClassVar[Tie | None] = None
     """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
+    resembles: ClassVar[Tie | None] = None
+    """A tie of which it is no member, as a joint may have both, but whose effects it can look like: where one of them, or it, is
+    found, all are compared."""
     steady_pull: ClassVar[bool] = False
     """Whether it is a steady force on the robot: of several such effects all but one only compensate for the imperfect fit of
     that one."""
@@ -147,7 +150,7 @@ class Effect:
     be known first. If not, it needs an estimator."""
 
     def sentence(self, spec: EffectSpec) -> str:
-        """One sentence for a person: how this robot differs from nominal."""
+        """One readable sentence: how this robot differs from nominal."""
         raise NotImplementedError
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
@@ -161,7 +164,7 @@ class Effect:
         return ()
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
-        """Whether this robot, playing these commands, could show it at all."""
+        """Whether it could be observed at all on this robot playing these commands."""
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:

@@ -7,7 +7,7 @@ from workbench.robot import RobotModel
 
 
 class FloorFriction(Effect):
-    """Feet slide more or less easily than the model has it."""
+    """Feet slide more or less easily than in the model."""
 
     layer = "ground"
     observable_when_fixed = False

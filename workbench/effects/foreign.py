@@ -57,5 +57,5 @@ def _call_hook(effect: Effect, hook: str, at: str, *args: Any, **named: Any) -> 
         return getattr(type(effect), hook)(effect, *args, **named)
     except (InputError, MemoryError):
         raise
-    except Exception as e:  # whatever another's code does
+    except Exception as e:  # a plug-in may raise anything
         raise InputError(None, f"{at}: effect '{effect.name}', hook {hook}: {type(e).__name__}: {e}") from e

@@ -8,7 +8,7 @@ from workbench.effects.library.payload import EFFECT
 from workbench.robot import EffectSpec, RobotModel
 
 MOST_MASS, FURTHEST = EFFECT.parameters[0].high, EFFECT.parameters[1].high
-"""Of a weight [kg], and of where it hangs along each axis of its link's frame [m]."""
+"""Largest weight [kg], and largest distance along each axis of its link's frame [m]."""
 
 
 @dataclass(frozen=True)

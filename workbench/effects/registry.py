@@ -18,16 +18,16 @@ def known_effects() -> dict[str, Effect]:
     import workbench.effects.library as room
 
     own = {effect.name: effect for effect in of_folder(room, "EFFECT", Effect)}
-    return with_plug_ins(own, ENTRY_POINT_GROUP, Effect, "effect", _checked)
+    return with_plug_ins(own, ENTRY_POINT_GROUP, Effect, "effect", _check)
 
 
-def _checked(effect: Effect, at: str) -> tuple[str, Effect]:
+def _check(effect: Effect, at: str) -> tuple[str, Effect]:
     check_effect(effect)
     return effect.name, answering_for(effect, at)
 
 
 def estimated_by(estimator: Estimator) -> tuple[Effect, ...]:
-    """The effects that are read off the recordings in this way."""
+    """The effects that are estimated directly from the recordings in this way."""
     return tuple(effect for effect in known_effects().values() if effect.estimator == estimator)
 
 

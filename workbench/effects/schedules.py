@@ -1,4 +1,4 @@
-"""Command schedules in which joints get their poses at different times."""
+"""Changes command schedules so that joints get their poses at different times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME = 1e-9
 
 
 def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
-    """The commands without some to one joint, which keeps the goal and speed that it had."""
+    """The commands without some poses of one joint, which keeps its previous goal and speed."""
     goals, speeds = commands.goals.copy(), commands.speeds.copy()
     for k in sorted(missed):
         goals[k, column] = goals[k - 1, column] if k else 0.0
@@ -26,7 +26,7 @@ def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Com
     return replace(commands, goals=goals, speeds=speeds)
 
 
-def delayed(commands: Commands, columns: Iterable[int], late: float, switched: bool = True) -> Commands:
+def delay_commands(commands: Commands, columns: Iterable[int], late: float, switched: bool = True) -> Commands:
     """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last. Until the first one
     it is in neutral, or, where commands had begun before, at the first one's goal. switched: whether the servo is switched on and
     off so much later as well."""
@@ -50,13 +50,13 @@ def delayed(commands: Commands, columns: Iterable[int], late: float, switched: b
     waits = not commands.begun  # in neutral
     neutral_now, neutral_before = (now < 0)[:, None] & waits, (before < 0)[:, None] & waits
 
-    def held(rows: np.ndarray, neutral: float) -> np.ndarray:
+    def hold(rows: np.ndarray, neutral: float) -> np.ndarray:
         out = np.where(neutral_now, neutral, rows[first])
         out[:, columns] = np.where(neutral_before, neutral, rows[shifted][:, columns])
         return out
 
-    enabled = held(commands.enabled, True) if switched else np.where(neutral_now, True, commands.enabled[first])
-    return Commands(times, commands.joints, held(commands.goals, 0.0), held(commands.speeds, 0.0),
+    enabled = hold(commands.enabled, True) if switched else np.where(neutral_now, True, commands.enabled[first])
+    return Commands(times, commands.joints, hold(commands.goals, 0.0), hold(commands.speeds, 0.0),
                     enabled.astype(bool), commands.end + late, commands.poses[first],
                     commands.begun)
 

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from workbench.cache import Cache
-from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
+from workbench.effects.sdf_values import format_numbers, numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose
 from workbench.files import InputError
 from workbench.robot import JointFrame, Kinematics
 from workbench.robot.model_source import user_file
@@ -30,7 +30,7 @@ it along with a mere 1.5 mN m."""
 DRAKE = "{http://drake.mit.edu}"
 
 KEPT = 64
-"""Kinematic trees that are kept."""
+"""Number of kinematic trees that are kept."""
 _kinematics: Cache[Kinematics] = Cache(KEPT)
 
 
@@ -45,7 +45,7 @@ class SdfRobot:
     def __init__(self, path: Path) -> None:
         self.path, self.source = path, user_file(path)
         ElementTree.register_namespace("drake", "http://drake.mit.edu")
-        self.root = deepcopy(_parsed(path, path.stat().st_mtime_ns))
+        self.root = deepcopy(_parse(path, path.stat().st_mtime_ns))
         model = self.root.find("model")
         if model is None:
             raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
@@ -82,7 +82,7 @@ class SdfRobot:
         if not np.linalg.norm(np.cross(across, frame.axis_B)) > 0.02:
             raise InputError(self.source, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
         xyz = Element("xyz", {"expressed_in": self._carried_by(joint)})
-        xyz.text = written(across)
+        xyz.text = format_numbers(across)
         if play > 0:
             self._add_stage(joint, xyz, (-play / 2, play / 2))
 
@@ -215,14 +215,14 @@ class SdfRobot:
             SubElement(group, f"{DRAKE}member").text = link
         SubElement(group, f"{DRAKE}ignored_collision_filter_group").text = f"{joint}_neighbours"
 
-    def _named(self, tag: str, name: str) -> Element:
+    def _find(self, tag: str, name: str) -> Element:
         for element in self._model.findall(tag):
             if element.get("name") == name:
                 return element
         raise InputError(self.source, f"expected a <{tag}> '{name}' in the model itself, not in a nested one")
 
     def _joint(self, name: str) -> Element:
-        return self._named("joint", name)
+        return self._find("joint", name)
 
     def _carried_by(self, joint: str) -> str:
         """The link that the joint has in the file, whatever was put between since."""
@@ -230,7 +230,7 @@ class SdfRobot:
         return self._link_of[joint]
 
     def _link(self, name: str) -> Element:
-        return self._named("link", name)
+        return self._find("link", name)
 
     def inertial(self, link: str) -> Element:
         """The <inertial> of a link; InputError where it has none."""
@@ -241,7 +241,7 @@ class SdfRobot:
 
 
 @lru_cache(maxsize=8)
-def _parsed(path: Path, changed: int) -> Element:
+def _parse(path: Path, changed: int) -> Element:
     """The root of a file, which has to be copied; changed: when the file was, so that it is read again."""
     return ElementTree.parse(path).getroot()
 

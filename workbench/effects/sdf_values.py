@@ -12,7 +12,7 @@ from workbench.types import Array
 _MOMENTS = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
 
 
-def written(values: Array) -> str:
+def format_numbers(values: Array) -> str:
     """Numbers as an SDF holds them, exact."""
     return " ".join(repr(float(v)) for v in np.ravel(values))
 
@@ -35,7 +35,7 @@ def write_pose(element: Element, p: Array, R: Array, relative_to: str | None = N
     for old in element.findall("pose"):
         element.remove(old)
     pose = SubElement(element, "pose", {"relative_to": relative_to} if relative_to else {})
-    pose.text = written(np.concatenate([p, _rpy(R)]))
+    pose.text = format_numbers(np.concatenate([p, _rpy(R)]))
 
 
 def shift_pose(shape: Element, shift: Array) -> None:
@@ -45,7 +45,7 @@ def shift_pose(shape: Element, shift: Array) -> None:
     if pose.get("relative_to"):
         raise InputError(None, f"shape '{shape.get('name')}': expected a pose relative to its link, not to another frame")
     values = (pose.text or "").split() or ["0"] * 6
-    pose.text = " ".join([written(np.array([float(v) for v in values[:3]]) + shift), *values[3:]])
+    pose.text = " ".join([format_numbers(np.array([float(v) for v in values[:3]]) + shift), *values[3:]])
 
 
 def read_inertia(inertial: Element) -> tuple[float, Array, Array]:

@@ -1,4 +1,4 @@
-"""Limits of the motions that a robot may be sent: joint ranges, speeds, and links that stay clear of each other."""
+"""Limits of motions for a robot: joint ranges, speeds, and links that stay clear of each other."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Reach:
         return float(np.clip(angle, min(low + room, 0.0), max(high - room, 0.0)))
 
     def range(self, joint: str) -> tuple[float, float]:
-        """Of goals [rad]; neutral is always inside."""
+        """Range of goals [rad]; neutral is always inside."""
         frame = self.model.kinematics.frames[joint]
         lower, upper = (b if math.isfinite(b) else math.copysign(EXPERIMENT.widest, b) for b in (frame.lower, frame.upper))
         return min(max(lower + EXPERIMENT.margin, -EXPERIMENT.widest), 0.0), max(
@@ -53,7 +53,7 @@ class Reach:
                     and (asked <= self.speeds * 1.001).all())
 
     def scaled_clear(self, segment: Segment) -> Segment | None:
-        """The segment, its angles made smaller until links stay clear of each other; None where that takes too much."""
+        """The segment with its angles reduced until links stay clear of each other; None if that would reduce them too much."""
         for share in (1.0, 0.8, 0.6, 0.4):
             smaller = replace(segment, angles=segment.angles * share)
             at = np.arange(0, segment.duration, 0.03)

@@ -1,4 +1,4 @@
-"""Who chooses the next experiment: a diagnosis with ties goes in, the diagnosis with a motion that separates them comes out."""
+"""Chooses the next experiment: adds to a diagnosis with ties a motion that separates them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.motion import Motion
 from workbench.types import Progress, no_progress
 
 MOTION = "next_experiment.csv"
-"""The motion's file, beside findings.json."""
+"""Name of the motion's file, next to findings.json."""
 
 
 def with_next_experiment(result: DiagnosisResult, n_jobs: int = 2, progress: Progress = no_progress

@@ -1,4 +1,4 @@
-"""Every number that the next experiment is designed with: unit, meaning and reason in one place."""
+"""Every threshold in the design of the next experiment, with unit, meaning and reason, in one place."""
 
 from __future__ import annotations
 
@@ -17,45 +17,45 @@ class ExperimentOptions:
     separated: float = 5.0
     """Log-likelihood ratio from which on names count as separated: odds of 150 to 1."""
     worth: float = 0.2
-    """How much another piece has to bring, in the logarithm of the log-likelihood ratio, summed over pairs."""
+    """Least gain of another piece, in the logarithm of the log-likelihood ratio, summed over pairs."""
     kept: int = 4
-    """Pieces, of those tried, on which sensitivities are found: these cost a rollout for each number."""
+    """Number of pieces for which sensitivities are computed: these cost a rollout for each number."""
     widest: float = math.radians(110)
-    """No joint is sent farther from neutral [rad]."""
+    """Largest angle from neutral to which a joint is sent [rad]."""
     margin: float = math.radians(5)
-    """Kept to a joint's ends, as links overshoot [rad]."""
+    """Distance kept from a joint's limits, as links overshoot [rad]."""
     speed_share: float = 0.9
-    """Of the speed that a servo reaches unloaded against its own friction."""
+    """Share used of the speed that a servo reaches unloaded against its own friction."""
     clear: float = 0.02
-    """Distance that links keep from each other, where they have it in neutral [m]."""
+    """Distance that links keep from each other, if they have it in neutral [m]."""
     nearer: float = 0.6
     """If they are closer than that in neutral, this share of their distance there."""
     points: int = 4
-    """On each bone of a link, from its joint to the next ones, at which distances are taken."""
+    """Number of points on each bone of a link, from its joint to the next ones, at which distances are computed."""
     rounds: int = 2
     """How often rivals are fitted to each other."""
     settled: float = 0.99
-    """Of chi squared: a round that leaves more of it has converged."""
+    """Share of chi squared: a round that leaves more of it has converged."""
     together: float = 0.05
     """Frames within this time have correlated errors and count as one [s]."""
     zero: float = math.radians(0.3)
-    """How far dry friction lets a joint stand from where it is thought to stand when angles are zeroed [rad]."""
+    """Error of a joint's assumed angle, due to dry friction, when angles are zeroed [rad]."""
     start: float = 0.01
-    """How far the first command's time may be off where cameras see the robot [s]."""
+    """Uncertainty of the first command's time if cameras see the robot [s]."""
     freedom: float = 0.5
-    """How far a parameter may still go, as a share of what there is of it: a standard deviation. The session fitted it."""
+    """Standard deviation of a parameter that the session has fitted, as a share of its size."""
     step: float = 0.2
-    """Of that, for sensitivities."""
+    """Step for sensitivities, as a share of that."""
     time_step: float = PROBLEM.time_step
-    """Of the rollouts [s], as the search's."""
+    """Time step of the rollouts [s], as in the search."""
     rest: float = PROBLEM.rest
-    """Before the first command [s], as the search's."""
+    """Rest before the first command [s], as in the search."""
     after: float = 0.02
-    """After the last frame [s]."""
+    """Time simulated after the last frame [s]."""
     upright: float = 0.94
     """Cosine of the tilt beyond which a robot counts as falling."""
     near: float = 0.5
-    """Of the distance that commands keep between links, what moving links have to keep."""
+    """Share of the distance commanded between links that moving links have to keep."""
     slow: float = math.radians(50)
     """Speed of sweeps [rad/s]."""
     quick: float = math.radians(150)

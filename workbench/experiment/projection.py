@@ -152,7 +152,7 @@ def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[Robo
         if not trials:
             break
         ends: dict[Imitator, list[tuple[Shown, Closest]]] = {}
-        for (i, x), y in zip(trials, play([rivals[i].moved(x).model for i, x in trials])):
+        for (i, x), y in zip(trials, play([rivals[i].move(x).model for i, x in trials])):
             now = reshown(known, y, i)
             ends.setdefault(i, []).append((now, now.closest(i, x, moving=False)))
         for i, options in ends.items():

@@ -25,7 +25,7 @@ class Rival:
         """How far each number of its own effects may still go (p,), in the units of docs/formats.md."""
         return np.array([EXPERIMENT.freedom * n.felt for n in self._numbers()])
 
-    def moved(self, x: Array) -> Rival:
+    def move(self, x: Array) -> Rival:
         """With its numbers moved by x (p,), in units of `freedom`, as far as is possible."""
         values = [float(np.clip(n.value + dx * f, n.low, n.high)) for n, dx, f in
                   zip(self._numbers(), x, self.freedom, strict=True)]
@@ -50,7 +50,7 @@ class Rival:
     def neighbours(self) -> list[Rival]:
         """With each number moved by its step, one at a time."""
         steps = self.steps()
-        return [self.moved(np.eye(len(steps))[i] * steps[i]) for i in range(len(steps))]
+        return [self.move(np.eye(len(steps))[i] * steps[i]) for i in range(len(steps))]
 
     def _numbers(self) -> list[_Number]:
         out = []

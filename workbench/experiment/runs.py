@@ -21,7 +21,7 @@ from workbench.types import Array, Progress
 
 
 class Runs:
-    """Rollouts at 2 ms on one base, seen at the rate of the recording to come."""
+    """Rollouts at 2 ms on one base, observed at the rate of the future recording."""
 
     def __init__(self, reach: Reach, base: str, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.reach, self.base, self.sight, self.n_jobs, self.progress = reach, base, sight, n_jobs, progress
@@ -60,7 +60,7 @@ class Runs:
         return np.concatenate([[-EXPERIMENT.rest, -EXPERIMENT.rest / 2, -1e-3], *frames])
 
     def sound(self, takes: Sequence[Take]) -> bool:
-        """Whether the robot stayed on its feet and its links apart, in all of them."""
+        """Whether the robot stayed upright and its links stayed apart in all of them."""
         return all(map(self._sound, takes))
 
     def _sound(self, take: Take) -> bool:

@@ -28,7 +28,7 @@ class BodyMoves:
         self.model, self.reach = model, reach
 
     def segments(self) -> list[Segment]:
-        """All that its legs can do."""
+        """All segments that its legs can execute."""
         if not self._legs:
             return []
         return [s for s in map(self.reach.scaled_clear, self._all()) if s is not None]
@@ -85,7 +85,7 @@ class BodyMoves:
             for bend in (1.0, -1.0):
                 first = np.zeros(len(joints))
                 # knees bend backwards: the shank's joint goes back of the line from hip to foot
-                first[-2:] = bend * np.array([0.4, 0.8 * self._opposed(foot, joints)])
+                first[-2:] = bend * np.array([0.4, 0.8 * self._sign_of_knee(foot, joints)])
                 tries.append(least_squares(partial(self._goal_error, foot, joints, goal),
                                            np.clip(first, ends[:, 0] + 1e-3, ends[:, 1] - 1e-3), bounds=(ends[:, 0], ends[:, 1])))
             good = [t.x for t in tries if np.linalg.norm(t.fun) < EXPERIMENT.missed * length]
@@ -95,7 +95,7 @@ class BodyMoves:
         assert set(out) <= set(k.joints)
         return out
 
-    def _opposed(self, foot: str, joints: tuple[str, ...]) -> float:
+    def _sign_of_knee(self, foot: str, joints: tuple[str, ...]) -> float:
         """-1 where hip and knee turn about the same axis, so that one has to move back as the other moves forward; else 1."""
         k = self.model.kinematics
         poses = k.forward(np.zeros((1, len(k.joints))))

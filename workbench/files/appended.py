@@ -1,4 +1,4 @@
-"""A file that is written while something happens, so that a program that is killed loses nothing of it."""
+"""A file that is written continuously, so that a killed program loses nothing."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from workbench.files.errors import InputError
 
 
 class AppendedFile:
-    """Appends; a file of that name must not be there. left_over: what such a file is, and what to do with it, for the message.
-    sync_every: longest time that a power cut may cost [s]; without it only `close` waits for the disk."""
+    """Appends to a new file; no file of that name may exist. left_over: what such a file would be, and what to do with it, for
+    the message. sync_every: most time that a power cut may cost [s]; without it only `close` waits for the disk."""
 
     def __init__(self, path: Path, left_over: str, sync_every: float = math.inf) -> None:
         self.path, self._sync_every, self._synced = path, sync_every, time.monotonic()
@@ -33,7 +33,7 @@ class AppendedFile:
         self.close()
 
     def append(self, data: bytes) -> None:
-        """All of it; InputError where the disk is full."""
+        """Appends everything; InputError if the disk is full."""
         try:
             while data:
                 data = data[os.write(self._file, data):]
@@ -44,7 +44,7 @@ class AppendedFile:
             raise InputError(self.path, f"cannot be written ({e.strerror}); what came before is kept") from None
 
     def close(self) -> None:
-        """On the disk, and closed."""
+        """Flushes to disk and closes."""
         if self._file >= 0:
             os.fsync(self._file)
             os.close(self._file)

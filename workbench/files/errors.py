@@ -1,4 +1,4 @@
-"""The one exception for input that a user has to correct."""
+"""The exception for input that a user has to correct."""
 
 from __future__ import annotations
 

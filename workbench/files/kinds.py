@@ -1,4 +1,4 @@
-"""Kinds of files that people bring, by their first bytes: the name of each, and how to convert it for the workbench."""
+"""File kinds that the workbench does not read, by their first bytes: the name of each, and how to convert it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _LFS = b"version https://git-lfs"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that is not read. name: of the kind. remedy: how to convert it."""
+    """A kind of file that is not read. name: its name. remedy: how to convert it."""
 
     name: str
     remedy: str
@@ -85,7 +85,7 @@ def kind_of_file(head: bytes, suffix: str = "") -> Kind | None:
 
 
 def lfs_pointer(head: bytes) -> str | None:
-    """What to say of a file that begins with `head` where that is Git LFS's pointer and not the file itself; else None."""
+    """The message for a file that begins with `head` if that is a Git LFS pointer instead of the file itself; else None."""
     if not head.startswith(_LFS):
         return None
     return "the file is a Git LFS pointer: run `git lfs pull` where the repository was cloned"

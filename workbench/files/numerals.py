@@ -1,4 +1,4 @@
-"""Numbers as files write them: Python's own `float` and `int` take more than that (1_0, digits of other scripts)."""
+"""Parses numbers as written in files: Python's own `float` and `int` accept more (1_0, digits of other scripts)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
 
 
 def number_of(text: str) -> float | None:
-    """The finite number that `text` writes in ASCII digits, with or without an exponent; None where it is none."""
+    """The finite number written in `text` in ASCII digits, with or without an exponent; None if it is not one."""
     text = text.strip()
     if len(text) > 400 or not _DECIMAL.fullmatch(text):
         return None
@@ -18,6 +18,6 @@ def number_of(text: str) -> float | None:
 
 
 def whole_of(text: str) -> int | None:
-    """The whole number that `text` writes in at most 18 ASCII digits; None where it is none."""
+    """The whole number written in `text` in at most 18 ASCII digits; None if it is not one."""
     text = text.strip()
     return int(text) if _WHOLE.fullmatch(text) else None

@@ -36,7 +36,7 @@ def with_plug_ins(own: Mapping[str, T], group: str, kind: type[S], called: str, 
         at = _place(entry)
         try:
             offered = entry.load()
-        except Exception as e:  # whatever another's module does
+        except Exception as e:  # a plug-in may raise anything
             raise InputError(None, f"{at}: {entry.value} cannot be loaded ({type(e).__name__}: {e})") from e
         if not isinstance(offered, kind):
             raise InputError(None, f"{at}: expected {kind.__name__}, got {type(offered).__name__} ({entry.value})")
@@ -50,8 +50,8 @@ def with_plug_ins(own: Mapping[str, T], group: str, kind: type[S], called: str, 
     return found
 
 
-def installed(group: str) -> dict[str, str]:
-    """Package of each entry point of a group, by the entry point's name; whether it can be loaded is not asked."""
+def list_installed(group: str) -> dict[str, str]:
+    """The package of each entry point of a group, by the entry point's name; they are not loaded."""
     return {entry.name: _package(entry) for entry in entry_points(group=group)}
 
 

@@ -1,4 +1,4 @@
-"""Problems of a file, as text that carries its kind."""
+"""Problems of a file: text with a kind."""
 
 from __future__ import annotations
 

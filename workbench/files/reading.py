@@ -1,4 +1,4 @@
-"""Reading and writing files so that a failure is one readable line and never half a file."""
+"""Reads and writes files so that a failure gives one readable line and never half a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ T = TypeVar("T")
 MOST_TEXT = 256 << 20
 """Largest file that is read as text at once [bytes]; a walk of a minute is 1 MB."""
 MOST_JSON = 32 << 20
-"""Likewise of JSON, which takes some ten times its size in memory; a log of 20 s is 0.2 MB."""
+"""The same for JSON, which takes some ten times its size in memory; a log of 20 s is 0.2 MB."""
 
 
 def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], T]], Callable[Concatenate[Path, P], T]]:
@@ -26,17 +26,17 @@ def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], 
 
     def decorate(read: Callable[Concatenate[Path, P], T]) -> Callable[Concatenate[Path, P], T]:
         @lru_cache(maxsize=maxsize)
-        def known(path: Path, content: bytes | None, *args: P.args, **kwargs: P.kwargs) -> T:
+        def read_content(path: Path, content: bytes | None, *args: P.args, **kwargs: P.kwargs) -> T:
             return read(path, *args, **kwargs)
 
         @wraps(read)
-        def cached(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
+        def read_again(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
             content = None
-            with suppress(OSError, InputError):  # `read` says what is wrong
+            with suppress(OSError, InputError):  # `read` reports the error
                 content = regular_file(path, MOST_TEXT).read_bytes()
-            return known(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
+            return read_content(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
 
-        return cached
+        return read_again
 
     return decorate
 
@@ -102,7 +102,7 @@ def _bounded_int(digits: str) -> int:
 
 
 def write_whole(path: str | Path, content: str | bytes) -> Path:
-    """Writes one file, whole or not at all, and makes its folder; InputError where it cannot be written."""
+    """Writes one file atomically, and creates its folder; InputError if it cannot be written."""
     path = Path(path)
     write_together(path.parent, {path.name: content})
     return path

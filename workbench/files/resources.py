@@ -1,4 +1,4 @@
-"""Where the models and data lie, in a source tree and in an installed wheel, and how Drake finds them."""
+"""Where models and data are, in a source tree and in an installed wheel, and how Drake finds them."""
 
 from __future__ import annotations
 

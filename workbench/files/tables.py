@@ -1,4 +1,4 @@
-"""Tables as spreadsheets and old computers write them, made plain: UTF-8, LF, commas between cells, points in numbers."""
+"""Normalises tables from spreadsheets and old computers: UTF-8, LF, commas between cells, points in numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from workbench.files.errors import InputError
 from workbench.files.reading import MOST_TEXT, regular_file
 
 HEAD = 1 << 16
-"""Bytes from which a file's kind and way of writing are told."""
+"""Bytes from which a file's kind and encoding are determined."""
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -38,7 +38,7 @@ def plain_table(content: bytes) -> tuple[bytes, str]:
 
 
 def _cells_least(first: bytes, cell: bytes) -> int:
-    """One separator tells only between words that a table's header has."""
+    """A single separator counts only between words that occur in a table's header."""
     words = [w.strip().strip(b'"').lower() for w in first.split(cell)]
     return 1 if words[0] in (b"time", b"frame", b"format version", b"timestamp", b"t") else 3
 

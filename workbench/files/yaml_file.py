@@ -52,7 +52,7 @@ for _tag, (_pattern, _first) in _PATTERNS.items():
 _CoreLoader.add_constructor(f"{_CORE}int", lambda loader, node: int(node.value))
 
 
-def _checked(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> int:
+def _count_values(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> int:
     """Number of values that a node expands to, with its aliases; MarkedYAMLError where that, or its depth, is too large, where
     it contains itself, or a value does not match its tag."""
     sizes = {} if sizes is None else sizes
@@ -75,7 +75,7 @@ def _checked(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> 
         if tag != ("map" if isinstance(node, yaml.MappingNode) else "seq"):
             raise yaml.MarkedYAMLError(problem=f"a tag '{_short(node.tag)}'; expected plain values", problem_mark=node.start_mark)
         children = [c for pair in node.value for c in pair] if isinstance(node, yaml.MappingNode) else node.value
-        total = 1 + sum(_checked(child, depth + 1, sizes) for child in children)
+        total = 1 + sum(_count_values(child, depth + 1, sizes) for child in children)
     if total > MOST_VALUES:
         raise yaml.MarkedYAMLError(problem=f"more than {MOST_VALUES} values, aliases written out", problem_mark=node.start_mark)
     sizes[id(node)] = total
@@ -108,7 +108,7 @@ def read_yaml(path: str | Path) -> Any:
             node = loader.get_single_node()
             if node is None:
                 return None
-            _checked(node)
+            _count_values(node)
             return loader.construct_document(node)
         finally:
             loader.dispose()

@@ -15,7 +15,7 @@ from workbench.gait.draws import draw_margins, slip_margin
 from workbench.gait.feet import feet_measure
 from workbench.gait.limits import Margin, contact_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import GaitMeasure, as_plain, fallen, from_plain, measure
+from workbench.gait.measure import ROWS, GaitMeasure, as_plain, fallen, from_plain, measure
 from workbench.gait.request import Request
 from workbench.gait.requirements import cost as cost_of
 from workbench.gait.requirements import direction_margins, speed_margins
@@ -34,7 +34,7 @@ BROKEN = 2.0
 """Cost of breaking a limit by a factor of e: a tenth over a limit costs the puppy 0.27 m/s."""
 LEAD = 0.03
 """At rest before the first command [s], in which the feet that carry the robot are identified."""
-SEARCH = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_period=0.01)
+SEARCH = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_period=ROWS)
 """While searching: 2 ms and 1 ms agree to a hundredth in speed."""
 
 

@@ -16,7 +16,7 @@ from workbench.gait.draws import Drawn, drawn
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.limit_cycle import LimitCycle, limit_cycle
-from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
+from workbench.gait.measure import ROWS, GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.record import Rest, Stretch, Ways
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.second_engine import Condition, Pair
@@ -140,7 +140,7 @@ class Examiner:
     def robots(self, robots: Sequence[RobotModel]) -> list[Drawn]:
         """Robots of the ensemble, by the compiled station; where that gives up, because something other than a foot touched the
         floor or two links each other, Drake says what came of it."""
-        config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
+        config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=ROWS)
         seconds = self.options.draw_seconds
         jobs, out = [self._job(r, config, seconds, SHORT_REST) for r in robots], []
         for robot, job, take in zip(robots, jobs, Rollouts(1).takes(jobs)):

@@ -1,5 +1,9 @@
 """A map of gaits over speed and turning: in each cell the gait whose motion differs least from robot to robot.
 
+A gait belongs to the cell of its median motion over drawn robots, since that is what it does on a robot that nobody measured. The
+search finds gaits on few of them; each cell's gait is then measured on others, because those few flatter the gaits that were
+chosen on them, and tried on fresh ones.
+
 Needs the extra [map] (pyribs). Inside `joblib.parallel_config(backend="dask")` the rollouts run on the client's cluster.
 """
 
@@ -41,12 +45,12 @@ CONFIG = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
 class MapOptions:
     """Size of the map and of its search.
 
-    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12
-    m/s. turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can
-    follow each other. generations, batch: of pyribs' emitter; robots: drawn ones, in addition to the nominal one, for the
-    spread. seconds: of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning
-    [m/s]. fresh: drawn robots on which each cell is tried afterwards. same: largest difference of the median there, as a share
-    of the map's range.
+    cells: along each axis. speed: from 0 to this [m/s]; turning: from minus to plus this [rad/s]; the demo's gait walks 0.12 m/s.
+    turn: largest turn of a shape [rad per stance]. family, knees: the same in every cell, so that neighbouring cells can follow
+    each other. generations, batch: of pyribs' emitter; robots: drawn ones of the search, in addition to the nominal one. seconds:
+    of each rollout; the first cycle is not counted. spread: speed that weighs as much as 1 rad/s of turning [m/s]. measured:
+    drawn robots on which the gaits found are measured. fresh: drawn robots on which each cell is tried afterwards. same: largest
+    difference of the median there, as a share of the map's range.
     """
 
     cells: int = 7
@@ -60,18 +64,20 @@ class MapOptions:
     robots: int = 4
     seconds: float = 2.0
     spread: float = 0.1
+    measured: int = 8
     fresh: int = 8
     same: float = 0.1
 
     def __post_init__(self) -> None:
-        check_whole(self, cells=2, generations=1, batch=2, robots=1, fresh=1)
+        check_whole(self, cells=2, generations=1, batch=2, robots=1, measured=1, fresh=1)
         check_positive(self, "speed", "turning", "turn", "seconds", "spread", "same")
 
 
 @dataclass(frozen=True)
 class Cell:
-    """speed [m/s], turning [rad/s]: of the nominal robot. spread: RMS difference of drawn robots from it [rad/s]. fresh: median
-    speed and turning of the fresh robots, None where one fell; reproduced: whether these are within `same`."""
+    """speed [m/s], turning [rad/s]: medians over the robots it was measured on. spread: RMS difference of these robots from them
+    [rad/s]. fresh: median speed and turning of the fresh robots, None where one fell; reproduced: whether these are
+    within `same`."""
 
     shape: GaitShape
     speed: float
@@ -129,8 +135,9 @@ class GaitMap:
 
 def load_map(path: str | Path, model: RobotModel) -> GaitMap:
     """A map that `GaitMap.save` wrote. InputError where it is none, or of another robot."""
+    text = read_text(Path(path))
     try:
-        content = json.loads(read_text(Path(path)))
+        content = json.loads(text)
         cells = [{**c, "shape": GaitShape.from_plain(c["shape"]), "fresh": tuple(c["fresh"]) if c["fresh"] else None}
                  for c in content["cells"]]
         options = {**content["options"], "knees": tuple(content["options"]["knees"])}
@@ -150,11 +157,13 @@ def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0
     """Fills the map. folder: for drawn robots' files. The same seed gives the same map, whatever `n_jobs` or the cluster is.
     InputError where pyribs is not installed."""
     search = _Search(GaitMachine(model), options or MapOptions(), n_jobs)
-    drawn = ensemble.draws(model, search.options.robots, seed, folder)
-    found = search.run([model, *drawn], seed, progress)
+    o = search.options
+    found = search.run([model, *ensemble.draws(model, o.robots, seed, folder)], seed, progress)
+    progress("measuring", None)
+    cells = search.measured(found, ensemble.draws(model, o.measured, seed + 1, folder, even=True))
     progress("fresh robots", None)
-    fresh = ensemble.draws(model, search.options.fresh, seed + 1, folder)
-    return GaitMap(search.options, search.tried(found, fresh), search.rollouts, model.sha256)
+    fresh = ensemble.draws(model, o.fresh, seed + 2, folder, even=True)
+    return GaitMap(o, search.tried(cells, fresh), search.rollouts, model.sha256)
 
 
 class _Search:
@@ -164,12 +173,11 @@ class _Search:
         space = space_of(machine, Request())
         self.space: Space = replace(space, low=_with(space, "turn", -options.turn), high=_with(space, "turn", options.turn))
 
-    def run(self, robots: Sequence[RobotModel], seed: int, progress: Progress) -> list[Cell]:
-        """Generation by generation; the nominal robot comes first."""
+    def run(self, robots: Sequence[RobotModel], seed: int, progress: Progress) -> list[GaitShape]:
+        """The gaits of all cells, generation by generation; the nominal robot comes first."""
         try:
             from ribs.archives import GridArchive
             from ribs.emitters import IsoLineEmitter
-            from ribs.schedulers import Scheduler
         except ModuleNotFoundError:
             raise InputError(None, "a map of gaits needs pyribs: pip install 'drake-workbench[map]'") from None
         o, n = self.options, len(self.space.names)
@@ -177,35 +185,50 @@ class _Search:
         archive = GridArchive(solution_dim=n, dims=(o.cells, o.cells), ranges=ranges, seed=seed)
         emitter = IsoLineEmitter(archive, iso_sigma=0.05, line_sigma=0.3, initial_solutions=_first(self.space, o, seed),
                                  bounds=[(0.0, 1.0)] * n, batch_size=o.batch, seed=seed)
-        scheduler = Scheduler(archive, [emitter])
         for k in range(o.generations):
             progress(f"generation {k + 1}, {len(archive)} of {o.cells**2} cells", k / o.generations)
-            points = scheduler.ask()
-            told = self.judged([self.shape(x) for x in points], robots)
-            scheduler.tell(np.array([t[0] for t in told]), np.array([t[1] for t in told]))
-        kept = archive.data(["solution", "objective", "measures"], return_type="tuple")
-        inside = [(x, s, m) for x, s, m in zip(*kept) if s > WORST / 2]
-        return [Cell(self.shape(x), float(m[0]), float(m[1]), float(-s)) for x, s, m in inside]
+            points = emitter.ask()
+            judged = self.judged([self.shape(x) for x in points], robots)
+            inside = [(x, *j) for x, j in zip(points, judged) if j is not None]
+            if inside:
+                archive.add(*(np.array(column) for column in zip(*inside)))
+        return [self.shape(x) for x in archive.data("solution")]
+
+    def measured(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[Cell]:
+        """Of gaits whose motion on these robots is in the same cell, the one that differs least from robot to robot."""
+        cells: dict[tuple[int, int], Cell] = {}
+        for shape, judged in zip(shapes, self.judged(shapes, robots)):
+            if judged is not None:
+                objective, (speed, turning) = judged
+                cell = Cell(shape, speed, turning, -objective)
+                place = self.place(speed, turning)
+                if place not in cells or cell.spread < cells[place].spread:
+                    cells[place] = cell
+        return list(cells.values())
+
+    def place(self, speed: float, turning: float) -> tuple[int, int]:
+        """Row and column of the cell of a motion inside the map's range."""
+        o = self.options
+        shares = speed / o.speed, (turning + o.turning) / (2 * o.turning)
+        row, column = (min(int(o.cells * share), o.cells - 1) for share in shares)
+        return row, column
 
     def shape(self, x: Array) -> GaitShape:
         """Of a point of the unit cube."""
         return self.space.shape(np.asarray(x, dtype=float), self.options.family, self.options.knees)
 
-    def judged(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[tuple[float, tuple[float, float]]]:
-        """Of each shape the objective, and speed and turning of the nominal robot."""
-        tables = self.tables(shapes)
-        known = [t for t in tables if t is not None]
-        motions = iter(zip(*self.played(known, robots)))
-        out = []
-        for table in tables:
-            every = next(motions) if table is not None else (None,)
-            standing = [m for m in every if m is not None]
-            if len(standing) < len(every) or table is None:
-                out.append((WORST, (0.0, 0.0)))
+    def judged(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]
+               ) -> list[tuple[float, tuple[float, float]] | None]:
+        """Of each shape the objective, and the median speed and turning of the robots; None where one falls, a limit is broken,
+        or these are beyond the map's range."""
+        o, out = self.options, list[tuple[float, tuple[float, float]] | None]()
+        for motions in self.played(self.tables(shapes), robots):
+            speed, turning = (math.nan, math.nan) if motions is None else np.median(motions, axis=0).tolist()
+            if motions is None or not (0.0 <= speed <= o.speed and abs(turning) <= o.turning):
+                out.append(None)
                 continue
-            nominal, drawn = np.array(standing[0]), np.array(standing[1:])
-            apart = (drawn - nominal) / np.array([self.options.spread, 1.0])
-            out.append((-float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))), (float(nominal[0]), float(nominal[1]))))
+            apart = (motions - [speed, turning]) / [o.spread, 1.0]
+            out.append((-float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))), (speed, turning)))
         return out
 
     def tables(self, shapes: Sequence[GaitShape]) -> list[GaitTable | None]:
@@ -220,31 +243,31 @@ class _Search:
             out.append(table if good else None)
         return out
 
-    def played(self, tables: Sequence[GaitTable], robots: Sequence[RobotModel]) -> list[list[Motion]]:
-        """Motions of every table on every robot, robot by robot."""
-        commands = [t.commands(max(2, math.ceil(self.options.seconds / t.period)) + 1) for t in tables]
-        jobs = [Job(robot, CONFIG, c, c.end) for robot in robots for c in commands]
-        self.rollouts += len(jobs)
-        takes = self._rollouts.takes(jobs, as_seen=False)
-        return [[motion(next(takes), robot, t) for t in tables] for robot in robots]
+    def played(self, tables: Sequence[GaitTable | None], robots: Sequence[RobotModel]) -> list[Array | None]:
+        """Speed [m/s] and turning [rad/s] of each table on every robot (R, 2); None without a table, or where a robot falls: the
+        robots after it do not play that table."""
+        seen: list[list[tuple[float, float]] | None] = [None if t is None else [] for t in tables]
+        for robot in robots:
+            standing = [(k, t, s) for k, (t, s) in enumerate(zip(tables, seen)) if t is not None and s is not None]
+            commands = [t.commands(max(2, math.ceil(self.options.seconds / t.period)) + 1) for _, t, _ in standing]
+            takes = self._rollouts.takes([Job(robot, CONFIG, c, c.end) for c in commands], as_seen=False)
+            self.rollouts += len(standing)
+            for (k, table, before), take in zip(standing, takes):
+                moved = motion(take, robot, table)
+                seen[k] = None if moved is None else [*before, moved]
+        return [None if s is None else np.array(s) for s in seen]
 
     def tried(self, found: Sequence[Cell], fresh: Sequence[RobotModel]) -> tuple[Cell, ...]:
         """The cells with what fresh robots did."""
-        o, tables = self.options, self.tables([c.shape for c in found])
-        motions = list(zip(*self.played([t for t in tables if t is not None], fresh)))
-        out = []
-        for cell, every in zip(found, motions):
-            if any(m is None for m in every):
+        o, out = self.options, []
+        for cell, motions in zip(found, self.played(self.tables([c.shape for c in found]), fresh)):
+            if motions is None:
                 out.append(cell)
                 continue
-            speed, turning = np.median(np.array(every), axis=0)
+            speed, turning = np.median(motions, axis=0).tolist()
             same = abs(speed - cell.speed) <= o.same * o.speed and abs(turning - cell.turning) <= o.same * 2 * o.turning
-            out.append(replace(cell, fresh=(float(speed), float(turning)), reproduced=bool(same)))
+            out.append(replace(cell, fresh=(speed, turning), reproduced=bool(same)))
         return tuple(out)
-
-
-WORST = -1e3
-"""Objective of a gait that falls or breaks a limit, far below any spread."""
 
 
 def motion(take: Take | None, robot: RobotModel, table: GaitTable) -> Motion:

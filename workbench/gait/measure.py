@@ -21,6 +21,9 @@ FALLEN_TILT, FALLEN_HEIGHT = np.radians(35), 0.55
 LASTING = 0.01
 """How long a torque has to last to count [s]; a servo's control loop turns once a millisecond, and the one-step impulses of a
 rigid contact are nothing it is asked to hold."""
+ROWS = 4e-3
+"""Between the rows of a take [s] in which such a torque is looked for: three rows span nearly LASTING. In rows 10 ms apart a
+contact's impulse that falls on one counts: 107 % of the torque-speed line where the share that lasts is 89 %."""
 FUSE_WINDOW = 0.1
 """Over which supply current is averaged against the fuse [s]: fuses of 10 A carry twice that for longer."""
 STALL_CURRENT = 1.5
@@ -170,7 +173,7 @@ def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
 
 def _lasting(x: Array, every: float) -> Array:
     """The largest value (n,) of each column that lasts LASTING, of samples `every` [s]."""
-    return np.asarray(minimum_filter1d(x, max(1, round(LASTING / every)), axis=0).max(axis=0))
+    return np.asarray(minimum_filter1d(x, math.ceil(LASTING / every - 1e-6), axis=0).max(axis=0))
 
 
 def base_jerk(time: Array, p: Array) -> float:

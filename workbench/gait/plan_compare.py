@@ -114,7 +114,7 @@ def _simulated(machine: GaitMachine, planned: Planned, take: Take, begin: float,
     at = begin + period * np.arange(K) / K
     p = np.stack([np.interp(at, take.time, take.p_WB[:, i]) for i in range(3)], axis=1)
     q = np.stack([np.interp(at, take.time, take.q[:, take.joints.index(j)]) for j in machine.model.joints], axis=1)
-    R = quat.matrix(quat.interpolated(take.time, take.quat_WB, at))
+    R = quat.matrix(quat.interpolate(take.time, take.quat_WB, at))
     elapsed = at - begin
     rate = planned.task.turn_rate
     heading = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0])) - rate * elapsed

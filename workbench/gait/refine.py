@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files.option_checks import check_positive, check_whole
+from workbench.gait.draws import OVER_DRAWS, draw_margins, slip_margin
 from workbench.gait.evaluate import Candidate, Evaluator
-from workbench.gait.limits import allowed_rms
+from workbench.gait.limits import clearance_margin, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.requirements import SLOWEST, drift
 from workbench.gait.search import Found, Progress
 from workbench.gait.shape import FAMILIES, GaitShape
 from workbench.gait.table import paths_of
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 
@@ -27,9 +29,12 @@ DAMPING = (1.0, 10.0, 100.0)
 SHARES = (1.0, 0.5)
 """Of each step that are tried."""
 FALLEN = 2.0
-"""Each of the residuals of a robot that fell: about the speed's of one that stands still."""
-ENOUGH = 1.7
-"""Foot clearance by its limit, from which more is not better: draws vary by a third."""
+"""Residuals of speed and heading of a robot that fell: about the speed's of one that stands still."""
+REPRODUCED = 0.05
+"""By how much the use of a limit on the nominal robot may grow from the search's run to the certificate's, longer and at half the
+step."""
+ALIKE = 0.02
+"""Least standard deviation of a limit's use over robots that counts."""
 
 
 KEPT = 2
@@ -40,12 +45,12 @@ KEPT = 2
 class RefineOptions:
     """Size of the refinement. InputError for a number out of range.
 
-    iterations: Gauss-Newton steps; 0: none. robots: of the ensemble, in addition to the nominal one. harmonics: of the cycle
-    in each joint's change, in addition to its mean. probe: change of a harmonic by which its effect is measured [rad]. target:
-    speed that is aimed at, by the nominal robot's. speed, heading [by rad/m], slip, clearance, torque: weights of the
-    residuals: speed is relative to the nominal robot's; slip and torque count from `near` of their limits on, clearance below
-    ENOUGH of its own. cautions: factors of the weights of slip, clearance and torque, one after the other until a gait keeps
-    the limits on all robots; parts: of the change that are tried on them.
+    iterations: Gauss-Newton steps; 0: none. robots: the slowest of the ensemble, in addition to the nominal one, whose rollouts
+    give the residuals. harmonics: of the cycle in each joint's change, in addition to its mean. probe: change of a harmonic by
+    which its effect is measured [rad]. target: speed that is aimed at, by the nominal robot's. speed, heading [by rad/m]: weights
+    of their residuals; speed is relative to the nominal robot's. limit: weight of a limit's use by its standard deviation over
+    robots; it counts from `headroom` standard deviations below the limit on: that of nine robots in ten is known to
+    half a standard deviation from eight. parts: of the change that are tried on all robots.
     """
 
     iterations: int = 1
@@ -55,38 +60,29 @@ class RefineOptions:
     target: float = 1.3
     speed: float = 1.7
     heading: float = 0.3
-    slip: float = 1.0
-    clearance: float = 1.0
-    torque: float = 3.0
-    near: float = 0.85
-    cautions: tuple[float, ...] = (1.0, 3.0)
+    limit: float = 1.0
+    headroom: float = 1.0
     parts: tuple[float, ...] = (1.0, 0.6, 0.3)
 
     def __post_init__(self) -> None:
         check_whole(self, iterations=0, robots=0, harmonics=0)
-        check_positive(self, "probe", "target", "speed", "heading", "slip", "clearance", "torque", "near")
+        check_positive(self, "probe", "target", "speed", "heading", "limit", "headroom")
 
 
 def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
-    """The search's result with its best gait refined, if that is better on all of the evaluator's robots. Where the whole
-    change breaks a limit on them, parts of it are tried, then a change that weighs the limits more. Gaits that are better come
-    first, the gait before them next. Only gaits that go straight and aim at speed are refined: their mirror symmetry halves
-    the unknowns."""
+    """The search's result with its best gait refined, by the whole change or a part of it, where that is better on all of the
+    evaluator's robots. Gaits that are better come first, the gait before them next. Only gaits that go straight and aim at speed
+    are refined: their mirror symmetry halves the unknowns."""
     request, best = evaluator.request, found.best
     if not options.iterations or request.way not in STRAIGHT or request.aim != "speed" or best.nominal is None:
         return found
-    better: dict[GaitShape, Candidate] = {}
-    for caution in options.cautions:
-        weighed = {name: caution * getattr(options, name) for name in ("slip", "clearance", "torque")}
-        shape = gauss_newton(evaluator, best.shape, replace(options, **weighed), progress)
-        if shape == best.shape:
-            continue
-        progress("the refined gait on the ensemble", None)
-        tried = evaluator.judged([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
-        better |= {c.shape: c for c in tried if c.nominal is not None and c.rank() < best.rank()}
-        if tried[0].shape in better:
-            break
-    first, *others = [*sorted(better.values(), key=Candidate.rank)[:KEPT], best]
+    shape = gauss_newton(evaluator, best.shape, options, progress)
+    if shape == best.shape:
+        return found
+    progress("the refined gait on the ensemble", None)
+    tried = evaluator.judged([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
+    better = sorted((c for c in tried if c.nominal is not None and c.rank() < best.rank()), key=Candidate.rank)
+    first, *others = [*better[:KEPT], best]
     return replace(found, best=first, others=(*others, *found.others), rollouts=evaluator.rollouts)
 
 
@@ -101,44 +97,98 @@ def gauss_newton(evaluator: Evaluator, shape: GaitShape, options: RefineOptions,
     """The shape with other offsets, whose residuals on the nominal robot and some others are smaller; the same shape where no
     step makes them so."""
     basis = _Basis.of(evaluator.machine, shape, options.harmonics)
-    robots = [evaluator.nominal, *evaluator.draws[:options.robots]]
-    (nominal,) = evaluator.measured([(shape, evaluator.nominal)])
-    speed = max(evaluator.request.progress(nominal), SLOWEST)
-
-    def residuals(points: Sequence[Array]) -> list[Array]:
-        shapes = [basis.shape(x) for x in points]
-        measures = evaluator.measured([(s, robot) for s in shapes for robot in robots])
-        each = [_residuals(evaluator, m, speed, options) for m in measures]
-        return [np.concatenate(each[k:k + len(robots)]) for k in range(0, len(each), len(robots))]
-
-    x = np.zeros(basis.size)
-    (r,) = residuals([x])
     for iteration in range(options.iterations):
-        progress(f"refining: step {iteration + 1} of {options.iterations}, {basis.size} numbers on {len(robots)} robots", None)
-        probed = residuals([x + options.probe * e for e in np.eye(basis.size)])
+        goal = Goal.of(evaluator, shape, options)
+        counted = f"{basis.size} numbers on {len(goal.robots)} robots"
+        progress(f"refining: step {iteration + 1} of {options.iterations}, {counted}", None)
+        zero = np.zeros(basis.size)
+        r, *probed = goal.residuals([basis.shape(x) for x in (zero, *(options.probe * np.eye(basis.size)))])
         J = np.stack([(p - r) / options.probe for p in probed], axis=1)
         steps = [-np.linalg.solve(J.T @ J + damping * np.eye(basis.size), J.T @ r) for damping in DAMPING]
-        points = [x + share * step for step in steps for share in SHARES]
-        tried = residuals(points)
+        points = [basis.shape(share * step) for step in steps for share in SHARES]
+        tried = goal.residuals(points)
         best = min(range(len(tried)), key=lambda k: float(tried[k] @ tried[k]))
         if tried[best] @ tried[best] >= r @ r:
             break
-        x, r = points[best], tried[best]
-    return basis.shape(x) if x.any() else shape
+        shape = points[best]
+        basis = replace(basis, offsets=np.array(shape.offsets))
+    return shape
 
 
-def _residuals(evaluator: Evaluator, m: GaitMeasure, speed: float, o: RefineOptions) -> Array:
-    """Of one robot (5,): to be made small. speed: the nominal robot's before [m/s]."""
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What is to be made small from a shape on: residuals of the nominal robot and of a few others, which stand for all.
+
+    robots: the nominal one first. speed: the nominal robot's at the shape [m/s]. limits: by name, of the others. Nine of ten
+    robots have to keep a limit: its use on the few counts as if the largest of theirs were that of nine in ten of all.
+    """
+
+    evaluator: Evaluator
+    options: RefineOptions
+    robots: tuple[RobotModel, ...]
+    speed: float
+    limits: Mapping[str, OverDraws]
+
+    @staticmethod
+    def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> Goal:
+        """At a shape, from its runs on all of the evaluator's robots."""
+        request, few = evaluator.request, options.robots
+        nominal, *draws = evaluator.measured([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
+        order = sorted(range(len(draws)), key=lambda k: request.progress(draws[k]))
+        order = [k for k in order if not draws[k].fell] + [k for k in order if draws[k].fell]
+        uses = [_largest(_uses(evaluator, draws[k], False)) for k in order if not draws[k].fell]
+        limits = {}
+        for m in draw_margins(evaluator.machine, request, draws):
+            name = m.name.removesuffix(OVER_DRAWS)
+            each = [use.get(name, 0.0) for use in uses]
+            limits[name] = OverDraws(m.use - max(each[:few], default=m.use), max(float(np.std(each)), ALIKE))
+        return Goal(evaluator, options, (evaluator.nominal, *(evaluator.draws[k] for k in order[:few])),
+                     max(request.progress(nominal), SLOWEST), limits)
+
+    def residuals(self, shapes: Sequence[GaitShape]) -> list[Array]:
+        """Of each shape (R,)."""
+        measures = self.evaluator.measured([(s, robot) for s in shapes for robot in self.robots])
+        n = len(self.robots)
+        return [np.concatenate([self._of(m, nominal=i == 0) for i, m in enumerate(measures[k:k + n])])
+                for k in range(0, len(measures), n)]
+
+    def _of(self, m: GaitMeasure, nominal: bool) -> Array:
+        """Of one robot: of speed and heading, then one for each limit and place."""
+        o, request = self.options, self.evaluator.request
+        uses = _uses(self.evaluator, m, nominal)
+        if m.fell:
+            return np.concatenate([[FALLEN, FALLEN], np.zeros(len(uses))])
+        reached = [o.speed * (o.target - max(request.progress(m), SLOWEST) / self.speed),
+                   o.heading * float(np.clip(drift(request, m), -1.5, 1.5))]
+        own = OverDraws(0.0, REPRODUCED)
+        beyond = [(use + limit.shift - 1) / limit.scatter + o.headroom
+                  for (name, _), use in uses.items() for limit in [own if nominal else self.limits.get(name, own)]]
+        return np.concatenate([reached, o.limit * np.maximum(beyond, 0.0)])
+
+
+@dataclass(frozen=True)
+class OverDraws:
+    """Use of a limit over robots. shift: that which nine of ten keep to, beyond the largest of a few. scatter: standard
+    deviation."""
+
+    shift: float
+    scatter: float
+
+
+def _uses(evaluator: Evaluator, m: GaitMeasure, nominal: bool) -> dict[tuple[str, str], float]:
+    """Use of each limit of a run by its name and place; those that were not measured count as kept."""
     machine, request = evaluator.machine, evaluator.request
-    if m.fell:
-        return np.full(5, FALLEN)
-    limits, gone = request.limits, max(request.progress(m), SLOWEST)
-    slip = m.slip / gone / limits.slip if np.isfinite(m.slip) else 0.0
-    high = m.clearance / limits.lift if np.isfinite(m.clearance) else 2.0
-    torque = max(float(np.max(np.array(m.rms) / allowed_rms(machine, limits))), max(m.torque_use) / limits.torque)
-    return np.array([o.speed * (o.target - gone / speed), o.heading * np.clip(drift(request, m), -1.5, 1.5),
-                     o.slip * max(slip - o.near, 0.0), o.clearance * max(ENOUGH - high, 0.0),
-                     o.torque * max(torque - o.near, 0.0)])
+    margins = [*run_margins(machine, m, request.limits), clearance_margin(request.limits, m),
+               slip_margin(machine, request, m, None if nominal else request.limits.slip_on_draws)]
+    return dict(sorted(((x.name, x.where), float(np.nan_to_num(x.use))) for x in margins if not x.advice))
+
+
+def _largest(uses: Mapping[tuple[str, str], float]) -> dict[str, float]:
+    """Of each name over its places."""
+    out: dict[str, float] = {}
+    for (name, _), use in uses.items():
+        out[name] = max(use, out.get(name, 0.0))
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from workbench.files import InputError
 from workbench.gait.certificate import NAME, Certificate, read_certificate
 from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
 from workbench.gait.ensemble import Ensemble
-from workbench.gait.evaluate import SEARCH, Evaluator
+from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import curvature, drift
@@ -111,11 +111,10 @@ def trim(machine: GaitMachine, gait: Gait, recorded: RecordedTurn, ensemble: Ens
     estimate = TurnEstimate.before(request.limits.spread, response.gain(recorded.speed), response.sd)
     estimate = estimate.after(0.0, excess, recorded.sd)
     turned = turned_by(machine, request, shape, estimate.turn)
-    config = replace(SEARCH, time_step=options.step)
-    evaluator = Evaluator(machine, request, (), n_jobs=1, config=config, seconds=options.seconds)
-    (walked,) = evaluator.measured([(turned, evaluator.nominal)])
-    trimmed = replace(request, bias=request.bias - drift(request, walked))
-    table = gait_table(machine, turned)
+    table, nominal = gait_table(machine, turned), request.on_slope(machine.model)
+    examiner = Examiner(nominal, machine.legs, table, replace(options, draw_seconds=options.seconds))
+    (walked,) = examiner.robots([nominal])  # as the certificate walks: another length or start turns by degrees more
+    trimmed = replace(request, bias=request.bias - drift(request, walked.measure))
     known = gait.certificate.provenance
     said = {"workbench": version("drake-workbench"), "drake": version("drake"), "ensemble": Path(ensemble.source).name,
             "ensemble_sha256": ensemble.sha256, "seed": known.get("seed", 0), "rollouts": 0, "searched in": 0.0,

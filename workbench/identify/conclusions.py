@@ -145,7 +145,7 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
     return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
 
 
-def rejected(
+def list_rejected(
     evidence: Sequence[TakeEvidence],
     fit: Fit,
     rounds: Sequence[SelectionStep],
@@ -181,7 +181,7 @@ def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
     return Outdone(best.candidate.name, best.candidate.where, best.gain["choose"], t.gain["choose"])
 
 
-def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+def list_unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels that exceed 1.3 times noise, floor and spread on unseen stretches, with the signal they correlate with.
 
     residuals: of takes that are judged. floors: by take, numerical floor (c,) over sigma of the fitted model, which may be

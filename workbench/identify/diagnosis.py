@@ -27,6 +27,7 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
+from workbench.identify.loads import unloaded_joints
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.preparation import check_duration, prepare
 from workbench.identify.problem import channel_gaps
@@ -137,7 +138,9 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     begun = Search(sent, known.model).evaluate([])
     played = TakesAsPlayed(sent, without=settings.without)
     evaluator, missed = played.without_missed(known.model, begun.residuals)
-    pool = build.asked(candidates(known.model, evidence)) + read_off_candidates(known.model, evidence, begun.residuals)
+    unloaded = unloaded_joints(known.model, evidence)
+    pool = build.select_untried(candidates(known.model, evidence, unloaded))
+    pool += read_off_candidates(known.model, evidence, begun.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
@@ -170,7 +173,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence])
-        | {"cannot_show": unobservable(session.model, evidence)},
+        | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)
     changed = bool(findings or unknown or found.recalibrated)
@@ -198,8 +201,8 @@ def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
     """Each take before and after. fitted: the model with its effects; None: nothing was found."""
-    was = [e.take.observed(nominal[e.name]) for e in evaluator.evidence]
-    now = was if fitted is None else evaluator.observed(fitted, evaluator.config)
+    was = [e.take.observe(nominal[e.name]) for e in evaluator.evidence]
+    now = was if fitted is None else evaluator.observe(fitted, evaluator.config)
     out = []
     for i, e in enumerate(evaluator.evidence):
         ill = channel_gaps(e, before[i])

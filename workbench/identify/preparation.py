@@ -79,11 +79,11 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
         moving &= ~unsettled_frames(steadied, t.recorded.since_start)
     if t.start_state() is not None:
         moving &= t.recorded.since_start >= PROBLEM.forgets
-    nominal = channels_of(t.observed(r.nominal), names)
-    finer = [channels_of(t.observed(f), names) for f in r.finer]
+    nominal = channels_of(t.observe(r.nominal), names)
+    finer = [channels_of(t.observe(f), names) for f in r.finer]
     finest = finer[-1] if finer else nominal
     floor = _apart(finest, finer[:-1] or [nominal], moving)
-    others = [channels_of(t.observed(o), names) for o in r.other_contact]
+    others = [channels_of(t.observe(o), names) for o in r.other_contact]
     spread = _apart(nominal, others, moving)
     noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
     resting = recorded[t.recorded.resting]

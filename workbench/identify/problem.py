@@ -92,9 +92,9 @@ class TakeEvidence:
         """Of one joint's channels; of every channel."""
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
-    def simulated(self, rollout: Take, model: RobotModel) -> Array:
+    def observe(self, rollout: Take, model: RobotModel) -> Array:
         """A rollout's channels (N, c) as this take would have shown them."""
-        return channels_of(self.take.observed(rollout, model), self.channels)
+        return channels_of(self.take.observe(rollout, model), self.channels)
 
     def residual(self, simulated: Array, model: RobotModel, corrected: bool = True) -> Array:
         """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. model: that was simulated;

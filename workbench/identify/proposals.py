@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.loads import unloaded_joints
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import point_mass
@@ -17,12 +16,13 @@ from workbench.identify.problem import TakeEvidence
 from workbench.robot import RobotModel
 
 
-def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
-    """Every known effect at every place where it could act, these takes could show it and a search from neutral find it."""
+def candidates(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Collection[str] = ()) -> list[Candidate]:
+    """Every known effect at every place where it could act, these takes could show it and a search from neutral find it.
+    unloaded: joints that nothing loads in these takes (`unloaded_joints`)."""
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
     start_known = not any(e.start_is_free for e in evidence)
-    sdf, unloaded = SdfRobot(model.path), unloaded_joints(model, evidence)
+    sdf = SdfRobot(model.path)
     out: list[Candidate] = []
     sent = [e.take.commands for e in evidence if e.take.commands is not None]
     for effect in known_effects().values():
@@ -33,7 +33,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
             late = effect.like_a_late_start and not where and not start_known
-            if late or (effect.needs_steady_load and where and unloaded.issuperset(where)):
+            if late or (effect.needs_steady_load and where and set(where) <= set(unloaded)):
                 continue
             if effect.point_mass:
                 out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))

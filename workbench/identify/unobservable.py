@@ -3,13 +3,12 @@ mean."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
-from workbench.identify.loads import unloaded_joints
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts.servo_logs import is_log
@@ -22,17 +21,17 @@ NO_START = "a later start looks the same, and no take says when it began"
 NO_LOAD = "gravity loads none of the joints"
 
 
-def unobservable(model: RobotModel, evidence: Sequence[TakeEvidence]) -> dict[str, str]:
-    """By effect, why these takes cannot show it at any place; by "still joints", those that no take moves."""
+def unobservable(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Collection[str] = ()) -> dict[str, str]:
+    """By effect, why these takes cannot show it at any place; by "still joints", those that no take moves. unloaded: joints that
+    nothing loads in these takes (`unloaded_joints`)."""
     if not evidence:
         return {}
     logs = all(is_log(e) for e in evidence)
     held = all(e.take.spec.base == "fixed" for e in evidence)
-    unloaded = unloaded_joints(model, evidence)
     moving = {j for e in evidence for j in e.channels if j in model.joints and _moves(e, j)}
     out = {}
     for name, effect in known_effects().items():
-        reason = _reason(effect, model, evidence, held, logs, unloaded.issuperset(model.joints))
+        reason = _reason(effect, model, evidence, held, logs, set(model.joints) <= set(unloaded))
         if reason:
             out[name] = reason
     if held:

@@ -1,4 +1,4 @@
-"""Problems of the files that a run uses, checked against the robot; reported by `inspect` and by every other verb."""
+"""Problems of the files that a run uses, found by checking them against the robot; reported by `inspect` and every other verb."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.compare.options import FILES
 from workbench.compare.prediction import read_start
 from workbench.compare.session import PredictSpec, Session, TakeSpec
 from workbench.compare.session_takes import capture_yaw, read_takes, readable
-from workbench.effects.apply import resolved
+from workbench.effects.apply import resolve
 from workbench.files import InputError
 from workbench.files.errors import MistypedError
 from workbench.files.problem import RoutineProblem
@@ -120,7 +120,7 @@ def model_problems_of(model: RobotModel) -> list[str]:
     lacking = [j for j in model.joints if j not in given]
     if given and lacking:
         out.append(f"servos: none is given for {', '.join(lacking)}; taken as an AX-12A")
-    list(resolved(model))  # InputError for an invalid effect
+    list(resolve(model))  # InputError for an invalid effect
     return out
 
 
@@ -165,14 +165,14 @@ def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:
 
 
 def long_work(seconds: float) -> str | None:
-    """A line where the requested duration is so long that it is probably a mistake."""
+    """A line if the requested duration is so long that it is probably a mistake."""
     if seconds <= FILES.longest:
         return None
     return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: check times, frames and cycles"
 
 
 def slow_poses(motion: Motion) -> str | None:
-    """A line where poses follow each other so slowly that their times are probably not in seconds."""
+    """A line if poses follow each other so slowly that their times are probably not in seconds."""
     apart = float(np.median(np.diff(motion.times)))
     if apart <= FILES.slowest_pose:
         return None
@@ -186,7 +186,7 @@ def serious(problems: Sequence[str]) -> list[str]:
 
 
 def summed_up(problems: Sequence[str], most: int = 3) -> str:
-    """Several problems in one line, the first few in full."""
+    """Several problems in one line: the first few in full, the rest counted."""
     more = f" (and {len(problems) - most} more: see workbench inspect)" if len(problems) > most else ""
     return "; ".join(problems[:most]) + more
 

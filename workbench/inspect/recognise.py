@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     from workbench.motion import Motion
 
 _LISTED = 20
-"""Names in one line of text; JSON has them all."""
+"""Maximum number of names in one line of text; the JSON lists them all."""
 _SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units", STAMPS)
-"""Of a Motive header: what other fields of the inspection say."""
+"""Metadata of a Motive header that other fields of the inspection already state."""
 _RESULTS = {"findings": ("verdict", "findings"), "comparison": ("takes", "joints_by_error"), "certificate": ("claim", "margins"),
             "bench": ("figures",)}
-"""JSON files that the workbench writes, by keys that they have."""
+"""JSON files that the workbench writes, by their keys."""
 
 
 @dataclass(frozen=True)
 class Inspection:
     """Description of a file.
 
-    rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets,
-    markers or channels that have any; share_of_gaps: over all of them. details: further facts about its kind.
-    unusable: why other verbs would refuse a session; empty where they would not.
+    rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets, markers or
+    channels that have any; share_of_gaps: over all of them. details: further facts about its kind. unusable: why other verbs
+    would refuse a session; empty if they would not.
     """
 
     file: str
@@ -66,7 +66,7 @@ class Inspection:
             "gaps": dict(self.gaps), "details": dict(self.details), "problems": list(self.problems)}
 
     def as_text(self) -> str:
-        """For a person: one line for each thing there is to say, the problems last."""
+        """Readable text: one line per fact, problems last."""
         lines = {
             "kind": self.kind, "version": self.version, "units": self.units,
             "rate": None if self.rate is None else f"{self.rate:g} Hz", "frames": self.frames,
@@ -82,7 +82,7 @@ class Inspection:
 
 
 def inspect_file(file: str | Path, packages: Mapping[str, str] | None = None) -> Inspection:
-    """Tells what `file` is; InputError where it cannot be read or is of no known kind. packages: as of RobotModel."""
+    """Identifies and checks `file`; InputError if it cannot be read or is of no known kind. packages: as of RobotModel."""
     name = str(file)
     path = Path(file)
     if name.startswith("package://"):
@@ -119,7 +119,7 @@ def _folder(path: Path) -> Inspection:
 
 
 def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:
-    """The function that knows files of this kind, or the `part` of one that is named; None for a robot's description."""
+    """The function that inspects files of this kind, or the named `part` of one; None for a robot's description."""
     suffix = path.suffix.lower()
     if suffix in (".npz", ".parquet"):
         return _recording
@@ -282,7 +282,7 @@ def _session(path: Path) -> Inspection:
     takes = {t.name for t in session.takes}
     none_left = bool(takes) and takes <= check.damaged_takes and not session.predict
     lost = check.refused or ("none of its takes can be used" if none_left else "")
-    logged = _logged(session)
+    logged = _describe_logging(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,
         details={"model": session.model.description, "base": session.model.base,
@@ -290,7 +290,7 @@ def _session(path: Path) -> Inspection:
         problems=tuple(problems), unusable=lost)
 
 
-def _logged(session: Session) -> dict[str, str]:
+def _describe_logging(session: Session) -> dict[str, str]:
     """How servo logs were logged; empty where the takes cannot be read, which is reported as their problem."""
     from workbench.compare.logged import how_logged
     from workbench.compare.session_takes import read_takes
@@ -311,7 +311,7 @@ def _fitted_model(path: Path) -> Inspection:
     named = [" ".join([e.effect, *e.where]) for e in model.effects]
     try:
         problems = model_problems_of(model)
-    except InputError as e:  # of an effect, which knows no file
+    except InputError as e:  # from an effect, which does not know the file
         raise e if e.source else InputError(path, f"effects: {e.problem}") from None
     return Inspection(str(path), "fitted_model", "1", joints=model.joints, details={"effects": named},
                       problems=tuple(problems))
@@ -371,5 +371,5 @@ def _names(names: tuple[str, ...] | list[Any]) -> str:
 
 
 def _line(text: str) -> str:
-    """Of one line, whatever a file's names hold."""
+    """The text on one line, whatever characters a file's names contain."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

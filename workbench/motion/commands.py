@@ -52,8 +52,8 @@ class Commands:
         out[sent] = from_[at] + _ramp(self.goals[at] - from_[at], reach[at], (t[sent] - self.times[at])[:, None])
         return out
 
-    def slowed(self, factor: float) -> Commands:
-        """The same, so many times as slow."""
+    def slow_down(self, factor: float) -> Commands:
+        """The same commands, slowed down by a factor."""
         return replace(self, times=factor * self.times, speeds=self.speeds / factor, end=factor * self.end)
 
     def column(self, joint: str) -> int:

@@ -1,4 +1,4 @@
-"""Pose tables as people write them: CSV in degrees, or a page of a ROBOTIS motion file."""
+"""Reads pose tables: CSV in degrees, or a page of a ROBOTIS motion file."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from workbench.robot import BUS_IDS, JOINTS, RobotModel, bus_ids
 from workbench.robot.servo_units import units_of
 
 MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
-"""Beyond an hour, or ten turns, a table is in another unit."""
+"""A table of more than an hour, or more than ten turns, is in another unit."""
 
 SPEED = "speed."
 """Prefix of a joint's name in the column of its moving speeds."""
 SECTION, CYCLES = "section", "# cycles:"
-"""The column that tells start, loop and stop, and the comment that says how often the loop runs."""
+"""The column for start, loop and stop, and the comment for the number of cycles."""
 
 
 def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
@@ -106,7 +106,7 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
 
 
 def _cycles(path: str | Path, text: str) -> int | None:
-    """How often the loop runs by the file's own comment; None without one."""
+    """The number of cycles in the file's comment; None without one."""
     for n, line in enumerate(text.splitlines(), start=1):
         if line.startswith(CYCLES):
             value = whole_of(line.removeprefix(CYCLES).strip())

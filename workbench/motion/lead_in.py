@@ -14,7 +14,7 @@ SLOW = 0.6
 """Speed of the fastest joint where no table sets one [rad/s]: a tenth of the speed of an AX-12A."""
 
 
-def paced(commands: Commands, count: Array, speed_unit: Array, slow: float = SLOW) -> Commands:
+def pace(commands: Commands, count: Array, speed_unit: Array, slow: float = SLOW) -> Commands:
     """The same commands, from neutral, in which no joint that has to move is sent speed 0 (at once).
 
     Such a joint gets the speed that brings it there within the dwell; a speed is rounded up to whole counts, speed_unit (n,)

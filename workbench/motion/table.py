@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.motion.lead_in import paced
+from workbench.motion.lead_in import pace
 from workbench.robot.servo_units import AX12A, ServoUnits
 from workbench.types import Array
 
 Counts = NDArray[np.int64]
 Section = Literal["start", "loop", "stop"]
 SECTIONS: tuple[Section, ...] = ("start", "loop", "stop")
-"""In the order in which they are played: once, again and again, once."""
+"""In playing order: once, repeatedly, once."""
 
 MOST_CYCLES = 10_000
-"""Of one run: hours of walking."""
+"""Most cycles of one run: hours of walking."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class PoseTable:
 
     @property
     def loop(self) -> int:
-        """How many poses are repeated."""
+        """Number of poses that are repeated."""
         return len(self) - self.start - self.stop
 
     @property
@@ -150,13 +150,13 @@ class PoseTable:
 
     def commands(self, cycles: int = 1) -> Commands:
         """The firmware's commands: each pose when the dwells before it are over; the start, so many loops, the stop. No joint is
-        sent speed 0 (`paced`)."""
+        sent speed 0 (`pace`)."""
         if not 1 <= cycles <= MOST_CYCLES:
             raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         played = self.order(cycles)
         ends = np.cumsum(self.dwells_ms[played]) / 1000
         goals = self.angles()[played]
-        return paced(Commands(
+        return pace(Commands(
             times=np.concatenate([[0.0], ends[:-1]]),
             joints=self.joints,
             goals=goals,

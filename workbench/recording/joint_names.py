@@ -1,4 +1,4 @@
-"""The joints of a log by the model's names."""
+"""Maps the joints of a log to the model's names."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ URDF_JOINTS = dict(zip(SO101_JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_fl
 
 
 def named_by_model(recording: Recording, model: RobotModel) -> Recording:
-    """A log with the model's joint names: the one joint of a log that does not name it is the model's one, others have the
-    model's names, or their format knows what else they are called."""
+    """A log with the model's joint names. If a log does not name its only joint, that is the model's only one; otherwise the
+    names are the model's, or aliases that the format knows."""
     joints = recording.joints
     if recording.nameless:
         if len(model.joints) != 1:
             raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
-        return _renamed(recording, {joints[0]: model.joints[0]})
+        return _rename(recording, {joints[0]: model.joints[0]})
     if set(joints) == set(recording.aliases) and set(recording.aliases.values()) <= set(model.joints):
-        return _renamed(recording, recording.aliases)
+        return _rename(recording, recording.aliases)
     unknown = [j for j in joints if j not in model.joints]
     if unknown:
         raise MistypedError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}"
@@ -34,8 +34,8 @@ def named_by_model(recording: Recording, model: RobotModel) -> Recording:
     return recording
 
 
-def _renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
-    """With joints called otherwise, `names` by those of the recording."""
+def _rename(recording: Recording, names: Mapping[str, str]) -> Recording:
+    """The recording with its joints renamed; `names`: new names by old ones."""
     channels = {}
     for channel, values in recording.channels.items():
         what, dot, joint = channel.partition(".")

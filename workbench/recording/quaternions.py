@@ -51,7 +51,7 @@ def from_matrix(R: Array) -> Array:
     return np.asarray(np.where(q[:, :1] < 0, -q, q))
 
 
-def interpolated(time: Array, q: Array, at: Array) -> Array:
+def interpolate(time: Array, q: Array, at: Array) -> Array:
     """Rotations (M, 4) at times `at` (M,) within `time` (N,), increasing, by the shortest turn at an even rate between
     neighbours of q (N, 4) (slerp)."""
     return np.asarray(Slerp(time, Rotation.from_quat(q, scalar_first=True))(at).as_quat(scalar_first=True))

@@ -14,7 +14,7 @@ from workbench.recording.body_track import BodyTrack
 from workbench.types import Array
 
 Sensing = Literal["mocap", "encoders"]
-"""What saw the robot: cameras its bodies, or its servos' own sensors their angles."""
+"""The sensors: cameras, which see bodies, or the servos' own encoders, which measure angles."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +56,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a robot was observed; a simulated take passes through the same.
+    """How a robot was observed; simulated takes are observed in the same way.
 
-    starts_at: time of the first command on the recording's clock [s]. yaw: of the model's first heading in the capture's
-    axes, about up, positive to the left [rad]. origin: the base link's origin at rest in the capture's axes turned into
-    the model's (z up) [m]. pivots: asset -> p_LP_L (3,) [m], the asset's pivot in its link's frame. rest: asset -> (p, quat wxyz)
-    in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
-    rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the
-    base's tilt there; a recorded zero is this pose. joint_starts: start estimated from each joint alone [s].
-    frames: asset -> rotation vector (3,) [rad],
-    in its own frame (the capture's axes, at rest), of the error of its stated orientation; about its pivot, which is unchanged.
-    The rest are standard deviations.
+    starts_at: time of the first command on the recording's clock [s]. yaw: of the model's first heading in the capture's axes,
+    about up, positive to the left [rad]. origin: the base link's origin at rest in the capture's axes turned into the model's (z
+    up) [m]. pivots: asset -> p_LP_L (3,) [m], the asset's pivot in its link's frame. rest: asset -> (p, quat wxyz) in the
+    capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m]. rest_pose: joint -> servo angle
+    [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the base's tilt there; a recorded zero is
+    this pose. joint_starts: start estimated from each joint alone [s]. frames: asset -> rotation vector (3,) [rad], in its own
+    frame (the capture's axes, at rest), of the error of its stated orientation; about its pivot, which is unchanged. The rest are
+    standard deviations.
     """
 
     starts_at: float

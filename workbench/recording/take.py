@@ -110,7 +110,7 @@ class Take:
                 return None
             return np.column_stack([np.interp(time, self.time, c, left=np.nan, right=np.nan) for c in y.T])
 
-        def moved(tracks: Mapping[str, BodyTrack]) -> dict[str, BodyTrack]:
+        def resample_tracks(tracks: Mapping[str, BodyTrack]) -> dict[str, BodyTrack]:
             return {k: BodyTrack(p=linear(b.p), quat=slerp(b.quat)) for k, b in tracks.items()}  # type: ignore[arg-type]
 
         def slerp(q: Array | None) -> Array | None:
@@ -124,7 +124,7 @@ class Take:
             if (q[good] == q[good][0]).all():  # a base that is held
                 out[inside] = q[good][0]
             else:
-                out[inside] = quat.interpolated(self.time[good], q[good], time[inside])
+                out[inside] = quat.interpolate(self.time[good], q[good], time[inside])
             out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
             return out
 
@@ -134,6 +134,6 @@ class Take:
             off_axis=None if off is None else linear(off.reshape(len(off), -1)).reshape(len(time), *off.shape[1:]),  # type: ignore[union-attr]
             q_sigma=linear(self.q_sigma), v=linear(self.v), p_WB=linear(self.p_WB),
             quat_WB=slerp(self.quat_WB), torque=linear(self.torque), mended=None, servo_q=linear(self.servo_q),
-            bodies=moved(self.bodies), links=moved(self.links),
+            bodies=resample_tracks(self.bodies), links=resample_tracks(self.links),
             contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]
         )

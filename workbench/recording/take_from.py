@@ -1,4 +1,4 @@
-"""From a recording, and how it looked at the robot, to a take."""
+"""Makes a take from a recording and its measurement."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from workbench.robot import RobotModel
 
 def take_from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
                         base: str = "free") -> Take:
-    """Joint angles with their uncertainty, base and bodies in the take's world, damage repaired, marked and reported.
+    """The take: joint angles with their uncertainty, base and bodies in the take's world, with damage repaired, marked and
+    reported.
 
     The world W has x along the robot's first heading, y left, z up; its origin lies under the base link's origin at rest, on the
-    capture's floor. InputError where an asset is no link of the model, where a recording has no rigid bodies, or a log's joints
-    are not the model's.
+    capture's floor. InputError if an asset is not a link of the model, a recording has no rigid bodies, or a log's joints are not
+    the model's.
     """
     label = name or Path(recording.source).stem
     if recording.sensing == "mocap":

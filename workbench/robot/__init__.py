@@ -1,4 +1,4 @@
-"""The machine as it should be, as plain data."""
+"""The nominal robot as plain data."""
 
 from workbench.files.resources import ROBOTS, ConfigurePackageMap, ConfigureParser, data_file, resolve_model, resource_dir
 from workbench.robot.bus_ids import bus_ids

@@ -1,4 +1,4 @@
-"""Which links are feet, how a foot is called, and where it can touch the ground: one definition for all packages."""
+"""Which links are feet, how feet are named, and where they can touch the ground: one definition for all packages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def feet_of(kinematics: Kinematics, listed: Sequence[str] | None) -> dict[str, s
 
     listed: links, as the session's `feet` names them. None: of a robot that can walk, the last link with a collision shape on
     each branch of the tree; none of a robot that the SDF mounts on the world. A foot has the name of the last joint that moves it
-    (the knee's); where two feet share that joint or nothing moves them, the link's name. InputError for a link that is not there.
+    (the knee's), or the link's name if two feet share that joint or nothing moves them. InputError for a link that does not
+    exist.
     """
     unknown = [link for link in listed or () if link not in kinematics.links]
     if unknown:

@@ -16,7 +16,7 @@ from workbench.types import Array
 @dataclass(frozen=True)
 class LawCovariance:
     """names (n): keys of servo.yaml, "torque_at_full_duty", "back_emf" and "zero". rows (n, n): covariance of their natural
-    logarithms, of "zero" in rad. InputError where it is no covariance."""
+    logarithms, of "zero" in rad. InputError if it is not a covariance."""
 
     names: tuple[str, ...]
     rows: tuple[tuple[float, ...], ...]
@@ -52,8 +52,8 @@ class LawCovariance:
         out[np.ix_(known, known)] = self.matrix[np.ix_(there, there)]
         return out
 
-    def written(self) -> dict[str, Any]:
-        """As a file has it."""
+    def as_dict(self) -> dict[str, Any]:
+        """As in a file."""
         return {"names": list(self.names), "rows": [list(row) for row in self.rows]}
 
 

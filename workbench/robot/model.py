@@ -25,7 +25,7 @@ from workbench.robot.servo_constants import ServoConstants
 
 PUPPY = "package://puppy/puppy.sdf"
 GRAVITY = 9.81
-"""Of free fall [m/s^2], as Drake's plants have it."""
+"""Gravity [m/s^2], as in Drake's plants."""
 FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """Writes the same text either way."""
 _AX_12A = ServoConstants()
@@ -66,12 +66,12 @@ class EffectSpec:
 class RobotModel:
     """The nominal robot and the effects added to it; plain data that knows no simulator code.
 
-    description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
-    constants by joint (AX-12A where none are given). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID
-    by joint. mountings: how servos sit on their joints, where the two angles differ. feet: links that stand on the ground; None:
-    the last link with a collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the
-    description's meshes name. held: its base was held in all its takes, and is where a simulation is not told otherwise.
-    InputError where the description is wanted for the base's default, and cannot be read.
+    description: SDF or URDF path, or package:// URL. base: link that floats; default: the tree's root. servos: constants by joint
+    (default: AX-12A). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID by joint. mountings: how
+    servos sit on their joints, where the two angles differ. feet: links that stand on the ground; None: the last link with a
+    collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the description's meshes name. held:
+    its base was held in all its takes, and is held in simulations by default. InputError if the base's default is needed and the
+    description cannot be read.
     """
 
     description: str
@@ -118,7 +118,7 @@ class RobotModel:
 
     @property
     def usual_base(self) -> Literal["free", "fixed"]:
-        """How its base is where nobody says it: fixed of a robot that was always held, or that its file mounts on the world."""
+        """The default for its base: fixed for a robot that was always held, or that its file mounts on the world; else free."""
         return "fixed" if self.held or self.kinematics.fixed_to_world else "free"
 
     @property
@@ -136,8 +136,8 @@ class RobotModel:
         return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
-        """The same robot with one effect more. InputError where it names a part that the robot does not have; whether the effect
-        is known and its numbers are possible is checked where a station is made of it, or the model saved."""
+        """The same robot with one more effect. InputError if it names a part that the robot does not have; whether the effect is
+        known and its numbers are possible is checked when a station is made of it, or the model is saved."""
         k = self.kinematics
         parts = {*self.joints, *k.links, *self.foot_links, *self.rigid_bodies}
         strange = [name for name in effect.where if name not in parts]
@@ -163,8 +163,8 @@ class RobotModel:
         return other
 
     def with_masses(self, path: Path, masses: Mapping[str, float]) -> RobotModel:
-        """The same robot by an SDF file made of its own, in which links have these masses [kg] and all else is as it was: what
-        is known of its tree and its feet is not read again."""
+        """The same robot with an SDF file derived from its own, in which links have these masses [kg] and everything else is
+        unchanged, so that its tree and feet are not read again."""
         other = replace(self, description=str(path))
         k = replace(self.kinematics, path=path, masses=dict(masses))
         vars(other).update(source=ModelSource(path, path), kinematics=k, foot_links=self.foot_links)

@@ -44,7 +44,7 @@ class Posterior:
 
 @dataclass(frozen=True)
 class ModelFile:
-    """All that a model.yaml says."""
+    """The content of a model.yaml."""
 
     model: RobotModel
     posterior: Posterior
@@ -63,8 +63,8 @@ def parameter_names(effects: Sequence[EffectSpec]) -> tuple[str, ...]:
 
 def save_model(model: RobotModel, path: str | Path, posterior: Posterior | None = None,
                provenance: Mapping[str, Any] | None = None) -> Path:
-    """Writes model.yaml, whole or not at all; returns its path. posterior: of the effects' parameters, provenance: how they were
-    found; both are kept for a reader and change nothing. InputError where it cannot be written."""
+    """Writes model.yaml atomically; returns its path. posterior: of the effects' parameters, provenance: how they were found;
+    both are kept for the reader and do not affect simulation. InputError if it cannot be written."""
     return write_whole(path, model_text(model, Path(path).parent, posterior, provenance))
 
 
@@ -86,7 +86,7 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
 def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
     """The keys `robot` and `ground` of a file in `folder`, without effects. Identical servos are written once; paths outside the
     folder are absolute."""
-    servos = {j: model.servo(j).written() for j in model.joints}
+    servos = {j: model.servo(j).as_dict() for j in model.joints}
     robot: dict[str, Any] = {
         "model": _description(model, folder.resolve()), "base": model.base,
         "servos": next(iter(servos.values())) if len({repr(s) for s in servos.values()}) == 1 else servos,

@@ -1,4 +1,4 @@
-"""How servos sit on their joints: which way they turn, and which angle they have where the joint's is zero."""
+"""How servos are mounted on their joints: their direction, and their angle when the joint's is zero."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEROBOT = {"id", "drive_mode", "homing_offset", "range_min", "range_max"}
 
 @dataclass(frozen=True)
 class Mounting:
-    """How one servo sits on its joint: the servo's angle from its centre is direction * (the joint's angle) + offset.
+    """How one servo is mounted on its joint: the servo's angle from its centre is direction * (the joint's angle) + offset.
 
     direction: 1, or -1 for a servo that turns against the joint's axis. offset [rad], rounded to whole counts. zero: position in
     counts at which the joint is at zero; None: given by the offset. homing: expected content of the servo's register

@@ -1,4 +1,4 @@
-"""How far each joint turns, as brackets and links allow it."""
+"""The range of each joint, as limited by brackets and links."""
 
 from __future__ import annotations
 

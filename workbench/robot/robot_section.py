@@ -1,4 +1,4 @@
-"""What `robot:` and `ground:` say in a YAML file (docs/formats.md, section 1), of a session as of a fitted model."""
+"""Reads `robot:` and `ground:` of a YAML file (docs/formats.md, section 1), in sessions and in fitted models."""
 
 from __future__ import annotations
 

@@ -149,12 +149,12 @@ class ServoConstants:
         """By key, None where the other position law's; what only some servos do is left out where this one does not."""
         out = {key: getattr(self, key) for key in KEYS
                if key != "covariance" and (key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key])}
-        return out | ({"torque_tables": [t.written() for t in self.torque_tables]} if self.torque_tables else {})
+        return out | ({"torque_tables": [t.as_dict() for t in self.torque_tables]} if self.torque_tables else {})
 
-    def written(self) -> dict[str, Any]:
-        """As servo.yaml has it."""
+    def as_dict(self) -> dict[str, Any]:
+        """As in servo.yaml."""
         known = dict(self.sd)
-        together = {} if self.covariance is None else {"covariance": self.covariance.written()}
+        together = {} if self.covariance is None else {"covariance": self.covariance.as_dict()}
         return {k: {"value": v, "sd": known[k]} if k in known else v
                 for k, v in self.constants().items() if v is not None} | together
 

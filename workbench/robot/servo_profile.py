@@ -12,12 +12,12 @@ from workbench.robot.servo_constants import ServoConstants
 
 LAW_KEYS = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
 MORE_KEYS = ("minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction")
-"""Of the nominal law of servos that do more."""
+"""Keys of the nominal law that only some servos have."""
 
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A number and how well it is known: value and standard deviation, in the number's own unit (docs/formats.md, section 4)."""
+    """A number with its uncertainty: value and standard deviation, in the number's own unit (docs/formats.md, section 4)."""
 
     value: float
     sd: float
@@ -53,7 +53,7 @@ class Register:
 
 @dataclass(frozen=True)
 class LawRegister:
-    """What sets a key of the nominal law: registers that should agree, the key's value for each count (`unit`), and the
+    """How registers set a key of the nominal law: registers that should agree, the key's value for each count (`unit`), and the
     values that have an effect, the largest at or below a written one (`steps`; none: all)."""
 
     registers: tuple[str, ...]
@@ -156,7 +156,7 @@ class ServoProfile:
         return min(max(round(rate / self.speed_unit), 1), self.largest_speed)
 
     def constants(self) -> ServoConstants:
-        """The nominal law of a servo nobody measured, and how well it is known."""
+        """The nominal law of an unmeasured servo, with its uncertainty."""
         keys: dict[str, Any] = dict.fromkeys(LAW_KEYS)
         return ServoConstants(model=self.name, **keys | {k: u.value for k, u in self.nominal.items()} | dict(self.tolerances),
                               sd=tuple((k, u.sd) for k, u in self.nominal.items()))

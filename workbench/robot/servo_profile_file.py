@@ -69,11 +69,11 @@ def servo_profiles() -> Mapping[str, ServoProfile]:
     `workbench.servos` names the path of a profile."""
     shipped = map(load_profile, sorted((resource_dir("data") / "servos").glob("*.yaml")))
 
-    def named(path: PurePath, at: str) -> tuple[str, ServoProfile]:
+    def load_named(path: PurePath, at: str) -> tuple[str, ServoProfile]:
         profile = load_profile(path)
         return profile.name, profile
 
-    return MappingProxyType(with_plug_ins({p.name: p for p in shipped}, ENTRY_POINT_GROUP, PurePath, "servo family", named))
+    return MappingProxyType(with_plug_ins({p.name: p for p in shipped}, ENTRY_POINT_GROUP, PurePath, "servo family", load_named))
 
 
 def servo_profile(model: str) -> ServoProfile:

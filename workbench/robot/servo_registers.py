@@ -29,8 +29,8 @@ class ServoReading:
 
 @dataclass(frozen=True)
 class Departure:
-    """A register that is not as the model has it. nominal, found: in the unit of the law's key, or in counts. effect: the physics
-    beyond the nominal model that this is (docs/formats.md, section 7), None where none says it."""
+    """A register that differs from the model. nominal, found: in the unit of the law's key, or in counts. effect: the
+    corresponding physics beyond the nominal model (docs/formats.md, section 7), None if there is none."""
 
     joint: str
     key: str
@@ -55,7 +55,7 @@ class ServoRegisters:
     joints: Mapping[str, ServoReading]
 
     def departures(self, model: RobotModel) -> tuple[Departure, ...]:
-        """Every register that sets the servo's law or limits its torque, and is not as the model says."""
+        """Every register that sets the servo's law or limits its torque, and differs from the model."""
         family = servo_profile(self.profile)
         out: list[Departure] = []
         for joint, reading in self.joints.items():

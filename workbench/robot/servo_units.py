@@ -61,7 +61,7 @@ def known_units(model: RobotModel, joints: Sequence[str]) -> tuple[ServoUnits, .
 
 
 def unknown_family(model: str) -> str:
-    """Why nothing can be sent to a servo of this name, "" where its family is known."""
+    """Why nothing can be sent to a servo of this name; "" if its family is known."""
     try:
         servo_profile(model)
     except InputError as e:
@@ -70,7 +70,7 @@ def unknown_family(model: str) -> str:
 
 
 def maker_of(model: str) -> str:
-    """Who builds a servo, "" where nobody knows."""
+    """The manufacturer of a servo; "" if unknown."""
     return "" if unknown_family(model) else servo_profile(model).maker
 
 

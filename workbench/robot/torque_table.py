@@ -1,4 +1,4 @@
-"""A repeatable torque of a servo that nobody has named, as a table (docs/formats.md, section 4)."""
+"""A repeatable torque of a servo for which there is no named effect, as a table (docs/formats.md, section 4)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ DependsOn = Literal["angle", "angle and direction", "duty", "duty and direction"
 """The argument of the torque. With direction: the torque changes sign with the motion, smoothly through rest."""
 UNITS: Mapping[DependsOn, str] = {
     "angle": "deg", "angle and direction": "deg", "duty": "1", "duty and direction": "1", "speed": "deg/s"}
-"""Of the values at which the torque is given."""
+"""Units of the values at which the torque is given."""
 MOST_KNOTS = 200
-"""Rows of one table; a torque that needs more is no smooth function."""
+"""Most rows of one table; a torque that needs more is not a smooth function."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class TorqueTable:
 
     @property
     def scale(self) -> float:
-        """By which `at` is multiplied to be in SI."""
+        """Factor that converts `at` to SI."""
         return 1.0 if UNITS[self.depends_on] == "1" else math.radians(1.0)
 
-    def written(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """As servo.yaml has it."""
         return {"depends_on": self.depends_on, "at": [float(x) for x in self.at], "torque": [float(x) for x in self.torque]}
 

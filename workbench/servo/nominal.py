@@ -1,4 +1,4 @@
-"""What servos do by the nominal law beyond constants: friction by load, and torques given as tables."""
+"""The nominal law's behaviour of servos beyond constants: friction by load, and torques given as tables."""
 
 from __future__ import annotations
 

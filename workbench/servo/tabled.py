@@ -1,4 +1,4 @@
-"""Torques that nobody has named, as tables of angle, duty or speed."""
+"""Torques without a named cause, as tables of angle, duty or speed."""
 
 from __future__ import annotations
 

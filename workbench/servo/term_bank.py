@@ -103,7 +103,7 @@ class TermBank(ServoBank):
         super().SetReference(context, reference)
         context.SetDiscreteState(self._memory, np.zeros(4 * len(self.joints) + 1))
 
-    def _remembered(self, context: Context) -> tuple[Array, bool]:
+    def _recall(self, context: Context) -> tuple[Array, bool]:
         """Rows (4, n) of the discrete state, and whether there was a last step."""
         memory = context.get_discrete_state(self._memory).value()
         return memory[:-1].reshape(4, -1), bool(memory[-1])
@@ -113,7 +113,7 @@ class TermBank(ServoBank):
         v = x[self._x_v]
         duty = law.duty(context.get_discrete_state(0).value() - x[self._q], v)
         duty = duty if on is None else duty * on
-        (last_v, _, load, held), stepped = self._remembered(context)
+        (last_v, _, load, held), stepped = self._recall(context)
         begin = context.get_numeric_parameter(self._first_command).value()[0]
         now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none, x[self._q])
         torque = duty * law.full_torque
@@ -130,17 +130,17 @@ class TermBank(ServoBank):
             push = push + term.more_torque(now)
         if not self._varies:
             return _Parts(push, motor, law.coulomb, self._none)
-        now = replace(now, motor=motor, direction=_limited(v / MOVING))
+        now = replace(now, motor=motor, direction=_clip(v / MOVING))
         friction = np.minimum(wanted_friction(self.terms, law, now), self._most)
         yielding = np.maximum(friction / 2, 1e-6)  # well below what brakes a joint that slides, so that this counts as sliding
-        now = replace(now, direction=_limited(v / MOVING - held / yielding))
+        now = replace(now, direction=_clip(v / MOVING - held / yielding))
         friction = np.minimum(wanted_friction(self.terms, law, now), self._most)
         if self._bristles:
             return _Parts(push, motor, friction, self._none)
         return _Parts(push, motor, friction, (self._most - friction) * now.direction)
 
     def _lost(self, torque: Array) -> Array:
-        """What of the motor's torque does not act, with its sign."""
+        """The part of the motor's torque that does not act, with its sign."""
         bent = torque / (1.0 + np.abs(torque) * self._bend)
         return np.asarray(torque - np.minimum(np.maximum(bent, -self._ceiling), self._ceiling))
 
@@ -164,7 +164,7 @@ class TermBank(ServoBank):
         if not self._varies:  # nobody asks for the load
             values.set_value(self._memory, np.concatenate([v, self._none, self._none, self._none, [1.0]]))
             return
-        (_, known, load, _), stepped = self._remembered(context)
+        (_, known, load, _), stepped = self._recall(context)
         parts: _Parts = self._parts.Eval(context)
         if stepped:  # implicit damping and the reflected inertia's change of speed, now that the step's end is known
             handed = known - (self.law.damping + self._inertia_rate) * v
@@ -192,7 +192,7 @@ class TermBank(ServoBank):
         return np.asarray(np.clip(force, -level, level), dtype=float)
 
 
-def _limited(direction: Array) -> Array:
+def _clip(direction: Array) -> Array:
     """Within -1 and 1."""
     return np.asarray(np.minimum(np.maximum(direction, -1.0), 1.0))
 

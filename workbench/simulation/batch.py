@@ -1,4 +1,4 @@
-"""Many runs over both cores, or over a Dask cluster, by joblib."""
+"""Many runs in parallel, on this machine's cores or on a Dask cluster, by joblib."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _one_at_a_time = threading.Lock()
 
 
 def run_job(job: Job) -> Take:
-    """One job in this process, by the engine that its configuration says."""
+    """Runs one job in this process, with the engine of its configuration."""
     if job.config.engine == "drake":
         return _run_by_drake(job)
     from workbench.simulation.compiled import NotCoveredError, run_compiled
@@ -100,7 +100,7 @@ def _by_drake(job: Job) -> Job:
 
 
 def _run_by_drake(job: Job) -> Take:
-    """On a kept station where model and configuration are those of an earlier job."""
+    """Runs a job by Drake, on a kept station if model and configuration equal an earlier job's."""
     key = (job.model.sha256, replace(job.config, engine="drake"))
     with _one_at_a_time:
         if key not in _stations:

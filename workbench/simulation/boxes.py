@@ -8,14 +8,14 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 
 TILE = 0.08
-"""Side of a box [m]: half of what lies between the puppy's front and hind feet, so that its feet stand on different ones."""
+"""Side of a box [m]: half the distance between the puppy's front and hind feet, so that its feet stand on different ones."""
 FIELD = ((-0.4, 2.0), (-0.64, 0.64))
 """Where there are boxes, x and y [m]: four seconds of its fastest gait, with room to stray; beyond it the floor is level. Drake's
 time to build such a field grows with the square of the number of boxes."""
 CLEAR = 0.2
-"""Round the start [m] there are none, so that the robot stands level before the first command."""
+"""Radius around the start [m] without boxes, so that the robot stands level before the first command."""
 DEPTH = 0.02
-"""How far boxes go down into the floor [m], so that no foot finds a gap."""
+"""Depth of the boxes below the floor [m], so that there are no gaps."""
 
 
 def AddBoxes(plant: MultibodyPlant, scene_graph: SceneGraph, tallest: float, seed: int) -> None:

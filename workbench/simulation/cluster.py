@@ -1,4 +1,4 @@
-"""Work in blocks on a cluster, where the caller has chosen one by `joblib.parallel_config`."""
+"""Work in blocks on a cluster, if the caller has chosen one by `joblib.parallel_config`."""
 
 from __future__ import annotations
 

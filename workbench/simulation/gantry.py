@@ -11,7 +11,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from scipy.spatial.transform import Rotation
 
 GAINS = PdControllerGains(p=1e6, d=1e4)
-"""[N/m, N m/rad]: the weight of a 2 kg robot bends it by 20 micrometres."""
+"""Stiffness [N/m, N m/rad]: the weight of a 2 kg robot deflects it by 20 micrometres."""
 AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 

@@ -1,4 +1,4 @@
-"""A motion played by the drive that a station has."""
+"""Plays a motion with a station's drive."""
 
 from __future__ import annotations
 

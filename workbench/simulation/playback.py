@@ -21,7 +21,7 @@ def play_back(diagram: RobotDiagram, context: Context, model: RobotModel, base: 
     q = np.zeros((len(take), len(model.joints)))
     for i, joint in enumerate(model.joints):
         if joint in take.joints:
-            q[:, i] = _bridged(take.time, take.q[:, take.column(joint)])
+            q[:, i] = _bridge(take.time, take.q[:, take.column(joint)])
     p_WB, quat_WB = bridged_base(take)
     plant = diagram.plant()
     plant_context = diagram.GetMutableSubsystemContext(plant, context)
@@ -44,11 +44,11 @@ def bridged_base(take: Take) -> tuple[Array, Array]:
     n = len(take)
     if take.p_WB is None or take.quat_WB is None:
         return np.zeros((n, 3)), np.tile([1.0, 0, 0, 0], (n, 1))
-    p = np.column_stack([_bridged(take.time, c) for c in take.p_WB.T])
-    quat = np.column_stack([_bridged(take.time, c) for c in take.quat_WB.T])
+    p = np.column_stack([_bridge(take.time, c) for c in take.p_WB.T])
+    quat = np.column_stack([_bridge(take.time, c) for c in take.quat_WB.T])
     return p, quat / np.linalg.norm(quat, axis=1, keepdims=True)
 
 
-def _bridged(time: Array, values: Array) -> Array:
+def _bridge(time: Array, values: Array) -> Array:
     good = np.isfinite(values)
     return np.interp(time, time[good], values[good]) if good.any() else np.zeros_like(values)

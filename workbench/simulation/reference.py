@@ -1,4 +1,4 @@
-"""Trajectories that joints' PD controllers follow: from plain arrays to Drake's desired_state ports."""
+"""Connects trajectories, given as plain arrays, to the desired_state ports of Drake's joint PD controllers."""
 
 from __future__ import annotations
 

@@ -142,8 +142,8 @@ class Simulation:
         return self._take(name, lead, sent, commands, sampled, forces, setter)
 
     def stepped(self, start: Start | None = None) -> SteppedRun:
-        """A run that takes its next commands while it goes: from rest in neutral, or from `start`. One at a time: a new run of
-        this simulation ends it. InputError unless the drive is "servo" and the base free or fixed."""
+        """A run that accepts further commands while it advances, from rest in neutral or from `start`. Only one at a time: a new
+        run of this simulation ends it. InputError unless the drive is "servo" and the base free or fixed."""
         from workbench.simulation.stepped import SteppedRun
 
         return SteppedRun(self, start)
@@ -311,7 +311,7 @@ class Simulation:
             context=self._plant_context, body=self._base, V_JpJc=SpatialVelocity(np.asarray(base.w_WB), np.asarray(base.v_WB)))
 
     def _centre_base(self) -> None:
-        """Takes the millimetres and the heading that settling added out of the state: the floor is the same everywhere."""
+        """Removes from the state the millimetres and the heading that settling added; the floor is the same everywhere."""
         if self.config.base != "free":
             return
         X_WB = self.plant.GetFreeBodyPose(self._plant_context, self._base)

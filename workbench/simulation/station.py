@@ -38,7 +38,7 @@ from workbench.simulation.reference import ConnectReference
 _APPROXIMATIONS = {"lagged": DiscreteContactApproximation.kLagged, "sap": DiscreteContactApproximation.kSap,
                    "similar": DiscreteContactApproximation.kSimilar}
 IDEAL_GAINS = PdControllerGains(p=1e5, d=1e3)
-"""Of the ideal drive [N m/rad, N m s/rad]: 1.5 N m bends it by 15 microradians."""
+"""Stiffness and damping of the ideal drive [N m/rad, N m s/rad]: 1.5 N m deflects it by 15 microradians."""
 
 
 def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> RobotDiagram:
@@ -157,7 +157,7 @@ def _add_drive(
 
 
 def AddIdealDrive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, law: ServoLaw) -> None:
-    """Joints that follow "joint_reference" whatever it takes: Drake's implicit PD, stiff and without an effort limit."""
+    """Joints that follow "joint_reference" exactly: Drake's implicit PD, stiff and without an effort limit."""
     joints = servo_joints(plant, model)
     for joint, inertia in zip(joints, law.inertia):
         actuator = find_actuator(plant, joint)

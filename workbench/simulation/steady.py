@@ -27,7 +27,7 @@ it, and a walk that goes another way nearly none."""
 
 @dataclass(frozen=True)
 class BaseStates:
-    """Where the base was. times: (K,) [s] after the first command; quat: (K, 4) wxyz, its turn since it rested before the first
+    """States of the base. times: (K,) [s] after the first command; quat: (K, 4) wxyz, its turn since it rested before the first
     command; v, w: (K, 3) [m/s, rad/s] of its origin and its turning. All in the axes of W."""
 
     times: Array
@@ -38,7 +38,7 @@ class BaseStates:
 
 @dataclass(frozen=True)
 class JointStates:
-    """Where the servos of a held robot were. times: (K,) [s] after the first command; q, v: (K, n) [rad, rad/s] in the model's
+    """States of the servos of a held robot. times: (K,) [s] after the first command; q, v: (K, n) [rad, rad/s] in the model's
     order of joints, as their own sensors tell them; NaN where unseen, which are left alone."""
 
     times: Array

@@ -37,7 +37,7 @@ class SteppedRun:
     def send(self, commands: Commands) -> None:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
         self._check_alive()
-        self._sent = followed(self._sent, commands.reordered(self._simulation.joints), self.time)
+        self._sent = switch_commands(self._sent, commands.reordered(self._simulation.joints), self.time)
         self._played = apply_to_commands(self._sent, self._simulation.model)
 
     def advance(self, seconds: float) -> None:
@@ -76,7 +76,7 @@ class SteppedRun:
             raise RuntimeError("another run of the same simulation has ended this one")
 
 
-def followed(before: Commands | None, after: Commands, now: float) -> Commands:
+def switch_commands(before: Commands | None, after: Commands, now: float) -> Commands:
     """A schedule on the run's clock: the commands sent before `now` [s], then `after`."""
     if before is None:
         return Commands(after.times + now, after.joints, after.goals, after.speeds, after.enabled, after.end + now, after.poses,

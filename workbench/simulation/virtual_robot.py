@@ -23,7 +23,7 @@ from workbench.device.virtual import (
     VirtualServo,
 )
 from workbench.device.virtual.motive import Pose, Scene
-from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of, resolved
+from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of, resolve
 from workbench.effects.base import Effect
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -115,7 +115,7 @@ class StationBody:
 
 def _without_controller(model: RobotModel) -> RobotModel:
     """The same robot with a controller that adds nothing: the commands on the bus have passed through the real one."""
-    kept = tuple(spec for effect, spec, _ in resolved(model) if type(effect).commands is Effect.commands)
+    kept = tuple(spec for effect, spec, _ in resolve(model) if type(effect).commands is Effect.commands)
     return replace(model, effects=kept)
 
 

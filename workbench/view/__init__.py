@@ -1,1 +1,1 @@
-"""To look at: figures, the 3D replay, the report page."""
+"""Output for people: figures, 3D replays and report pages."""

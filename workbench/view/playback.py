@@ -62,8 +62,8 @@ def common_span(takes: list[Take], lead: float = 0.3) -> tuple[float, float]:
 def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback] | None = None) -> Playback:
     """The take at `time` (F,) [s] since the first command.
 
-    Gaps hold the last pose that was seen. `like`: another take of the same motion, and its playback at the same times.
-    Joints that this take lacks follow it, and where that one stood before the first command this one is laid over it.
+    Gaps hold the last pose that was seen. `like`: another take of the same motion, and its playback at the same times. Joints
+    that this take lacks follow it, and this take is aligned with it at rest, if it rested before the first command.
     """
     clock = since_start(take)
     q = _joints(take, model, time, clock, like)
@@ -120,7 +120,7 @@ def _interpolate(time: Array, clock: Array, values: Array) -> Array:
 
 
 def _unrecorded_base(time: Array, other: Playback | None, held: bool) -> tuple[Array, Array]:
-    """A base that was not recorded: where the other take's is, or, if it was held, where that was at first; else level."""
+    """The pose for a base that was not recorded: the other take's, or its first one if the base was held; else level."""
     if other is not None:
         still = np.zeros(len(time), dtype=int) if held else np.arange(len(time))
         return other.base_p[still], other.base_R[still]
@@ -138,8 +138,8 @@ def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
 
 
 def _laid_over(p: Array, R: Array, other: Playback, zeroed: bool) -> tuple[Array, Array]:
-    """Rotated about the vertical and moved so that both coincide at rest. The attitude of a zeroed take is relative to its rest
-    pose, so it is given the other's tilt at rest."""
+    """The base rotated about the vertical and moved so that both takes coincide at rest. The attitude of a zeroed take is
+    relative to its rest pose, so it is given the other's tilt at rest."""
     resting = other.time < 0 if (other.time < 0).any() else np.arange(len(other.time)) == 0
     R_rest, R_other = (Rotation.from_matrix(X[resting]).mean().as_matrix() for X in (R, other.base_R))
     turn = R_other @ R_rest.T

@@ -92,9 +92,8 @@ def _visual(inspector: Any, geometry: Any, meshes: dict[str, list[MeshPart]]) ->
 
 
 def _mesh_parts(path: Path, scale: Array, rgba: Rgba) -> list[MeshPart]:
-    """The file's triangles, a part for each material; `rgba` where it has none. glTF's y axis is made z, as Drake does.
-
-    Drawn by us, as meshcat shows no .glb, loads other files late, and has them again for each servo.
+    """The file's triangles, a part for each material; `rgba` where it has none. glTF's y axis becomes z, as in Drake. We draw the
+    triangles ourselves, because meshcat cannot show .glb, loads other files late, and stores a copy for each servo.
     """
     loaded = trimesh.load_scene(path)
     turn = np.eye(4)

@@ -214,7 +214,7 @@ def test_where_nothing_stays_nothing_is_compared(worn):
 
 def test_a_rival_must_lead_by_more_where_no_fit_is_right():
     search = search_on("fixed")
-    expected = search.evaluator.expected((0,), "choose")
+    expected = search.evaluator.expected_cost((0,), "choose")
     assert misfit(search, fit_of(choose=400.0 * expected)) == pytest.approx(400.0)
     assert misfit(search, fit_of(choose=0.6 * expected)) == 1.0
 
@@ -222,8 +222,8 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
 def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
     """A cable hangs on another joint of a robot whose joint's names are contested on a fixed base."""
     search, friction = search_on("fixed", "free"), candidate("coulomb_friction", "one")
-    expected = search.evaluator.expected((0,), "choose") / 2  # of one joint
-    cost = 400.0 * search.evaluator.expected(search.fitted, "choose")
+    expected = search.evaluator.expected_cost((0,), "choose") / 2  # of one joint
+    cost = 400.0 * search.evaluator.expected_cost(search.fitted, "choose")
     fit = fit_of((), {0: leaving(1.3 * expected, "one"), 1: leaving(0.0)}, choose=cost)
     own, whole = (CandidateFit(friction, np.ones(1), {"choose": 100.0}, joint) for joint in ("one", None))
     assert dispersion(search, fit, friction, own) == pytest.approx(1.3 * ODDS.temper)

@@ -1,4 +1,4 @@
-"""The heart of the demo: which physics a simulated arm lacks, found from its logs."""
+"""The central part of the demo: finds the physics that the model of a simulated arm lacks, from the arm's logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The end of the demo: a new gait, searched for in seconds, certified, exported."""
+"""The last part of the demo: a new gait, searched for in seconds, certified and exported."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ SPEED = 0.10
 
 
 def demo_options() -> OptimizeOptions:
-    """A look that takes seconds: few seeds, four robots of the ensemble in the search and twenty in the certificate, the
-    least that gives a 5th percentile; no finer step than half a millisecond; neither refined nor straightened."""
+    """Options for a search that takes seconds: few seeds; four robots of the ensemble in the search and twenty in the
+    certificate, the fewest that give a 5th percentile; no time step below half a millisecond; neither refined nor
+    straightened."""
     first = options_of(1)
     return replace(first, budget=replace(first.budget, seeds=30, screened=5, generations=6, population=8, draws=4, enough=1),
                    certify=replace(first.certify, draws=20, seconds=4.0, draw_seconds=2.0, variants=("2 ms", "1 ms", "0.5 ms"),

@@ -30,7 +30,7 @@ from workbench.view.report.page import Details, Picture, Provenance, Replay, Rep
 from workbench.view.scene.replay import write_replay
 
 SECONDS, CYCLES = 6.0, 13
-"""Of the walk, from rest (thesis, chapter 7.2); its cycles take 0.468 s."""
+"""Duration of the walk, from rest [s] (thesis, chapter 7.2); its cycles take 0.468 s."""
 RUNS = ("servo", "point"), ("servo", "hydroelastic"), ("ideal", "point"), ("ideal", "hydroelastic")
 DRIVES = {"servo": "servo law", "ideal": "ideal joints"}
 Row = tuple[str, float, float, float]
@@ -48,8 +48,9 @@ _SUMMARY = (
     "and in hydroelastic contact, and compared with a bundled recording; a diagnosis of missing physics; the walk as the robot's "
     "firmware tables; a new gait.")
 _SYNTHETIC = (
-    "The recording is **synthetic**: the same robot in another engine (MuJoCo), filmed as a motion capture system would. Nothing "
-    "is hidden in it, so what differs is the engine, the capture's noise, and what walking makes of both.")
+    "The recording is **synthetic**: the same robot in another engine (MuJoCo), filmed as a motion capture system would. "
+    "Nothing is hidden in it: the differences come from the engine, the capture's noise, and the chaos of walking, which "
+    "amplifies both.")
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
 
 
 def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:
-    """The four runs by label; the servo law in point contact first."""
+    """The four runs by label, beginning with the servo law in point contact."""
     labels = [f"{DRIVES[drive]}, {contact}" for drive, contact in RUNS]
     configs = [SimulationConfig(drive=drive, contact=contact, engine="drake") for drive, contact in RUNS]
     jobs = [motion_job(model, config, motion, CYCLES, SECONDS) for config in configs]
@@ -108,15 +109,15 @@ def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | N
 
 
 def _end(take: Take) -> tuple[float, float, float]:
-    """Where the body came to, in the thesis's axes [cm]: forward, up, right."""
+    """The body's final position in the thesis's axes [cm]: forward, up, right."""
     assert take.p_WB is not None
-    forward, left, up = 100 * metrics.travelled(take.p_WB, take.since_start)
+    forward, left, up = 100 * metrics.displacement(take.p_WB, take.since_start)
     return float(forward), float(up), float(-left)
 
 
 def _heading(take: Take) -> float:
     assert take.quat_WB is not None
-    return float(np.rad2deg(metrics.turned(take.quat_WB, take.since_start)))
+    return float(np.rad2deg(metrics.heading_change(take.quat_WB, take.since_start)))
 
 
 def _walk_section(rows: list[Row], takes: Mapping[str, Take], model: RobotModel, folder: Path) -> Section:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from workbench.device.bus.errors import BusError
-from workbench.device.bus.ports import GONE, gone
+from workbench.device.bus.ports import GONE, port_gone
 from workbench.device.link import AnswerMessage, FrameReader, FrameType, StateMessage, frame, message
 
 RATE = 57_600
@@ -34,7 +34,7 @@ def enter_bridge(port: Any) -> None:
             if answer is not None:
                 raise BusError(f"the CM-530 does not go into bridge mode ({answer.result}){doing}; hold START for 1.5 s first")
     except GONE as e:
-        raise gone(e) from None
+        raise port_gone(e) from None
     raise BusError(f"no CM-530 with the workbench's program answers at {RATE} bit/s{doing}; `workbench flash` puts it there")
 
 

@@ -11,10 +11,9 @@ from typing import Any, Literal, TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
 
-from workbench.device.bus import group
+from workbench.device.bus import group, wire
 from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
-from workbench.device.bus.ports import GONE, StripEcho, gone
-from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, parameters_of, ping, read_packet
+from workbench.device.bus.ports import GONE, StripEcho, port_gone
 from workbench.robot.servo_profile import Register, ServoProfile
 
 T = TypeVar("T")
@@ -52,8 +51,8 @@ class Bus:
         self.group_kind: group.Kind | Literal[""] = profile.group_read
         if strip_echo:
             self.port = StripEcho(port)
-        elif self._guarded(lambda: hears_itself(port, profile.protocol)):
-            raise echo_error()
+        elif self._release_after(lambda: wire.hears_itself(port, profile.protocol)):
+            raise wire.echo_error()
 
     # Time
 
@@ -63,11 +62,11 @@ class Bus:
 
     def wait_until(self, time: float) -> None:
         """Lets time go by until then [s]."""
-        self._guarded(lambda: self.port.pause(time - self.now()))
+        self._release_after(lambda: self.port.pause(time - self.now()))
 
     def pause(self, seconds: float) -> None:
         """Lets time go by."""
-        self._guarded(lambda: self.port.pause(seconds))
+        self._release_after(lambda: self.port.pause(seconds))
 
     def close(self) -> None:
         """Gives the port back; one that is gone is none."""
@@ -80,14 +79,13 @@ class Bus:
         """Registers by name, in one packet from the first to the last of them; asked again where the answer is missing or broken.
 
         NoAnswerError after `tries`, BusError where the servo refuses."""
-        wanted = [self._register(name) for name in names]
-        first = min(r.address for r in wanted)
-        count = max(r.address + r.size for r in wanted) - first
+        wanted, first, count = self._block(names)
 
         def call() -> tuple[bytes, int, int]:
             self.asked = self.now() + (8 if self.profile.protocol == 1 else 14) * self.port.tx_time_per_byte / 1000
-            answer, result, error = self._handler.txRxPacket(self.port, read_packet(self.profile.protocol, servo, first, count))
-            return parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
+            question = wire.read_packet(self.profile.protocol, servo, first, count)
+            answer, result, error = self._handler.txRxPacket(self.port, question)
+            return wire.parameters_of(self.profile.protocol, answer) if result == COMM_SUCCESS else b"", result, error
 
         data = self._ask(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
@@ -139,29 +137,17 @@ class Bus:
         kind = self.group_kind
         if not kind:
             raise ValueError(f"{self.profile.name} cannot be asked all at once")
-        wanted = [self._register(name) for name in names]
-        first = min(r.address for r in wanted)
-        count = max(r.address + r.size for r in wanted) - first
+        wanted, first, count = self._block(names)
         packet = group.question(kind, servos, first, count)
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
-        heard = self._guarded(lambda: self._collect(packet, group.reply_length(kind, len(servos), count)))
+        heard = self._release_after(lambda: wire.collect(self.port, packet, group.reply_length(kind, len(servos), count)))
         out = {}
         for servo, (error, data) in group.answers(kind, heard, count, servos).items():
             self._look(servo, error)
             out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        if heard and len(out) < len(servos):
+            self._release_after(lambda: wire.wait_for_silence(self.port))
         return out
-
-    def _collect(self, packet: bytes, most: int) -> bytes:
-        """Sends and listens until so many bytes are there, or none came for as long as the port has patience."""
-        port = self.port
-        port.clearPort()
-        port.writePort(list(packet))
-        heard, last = bytearray(), port.getCurrentTime() + len(packet) * port.tx_time_per_byte
-        while len(heard) < most and port.getCurrentTime() < last + port.patience + 70 * port.tx_time_per_byte:
-            got = bytes(port.readPort(most - len(heard)))
-            if got:
-                heard, last = heard + got, port.getCurrentTime()
-        return bytes(heard)
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
         """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when its
@@ -174,9 +160,9 @@ class Bus:
         length = sum(r.size for r in registers)
         packed = [bytes([servo]) + b"".join(r.encode(v[r.name]) for r in registers) for servo, v in values.items()]
         sent, frame = self.now(), 8 if self.profile.protocol == 1 else 14
-        for some in _batched(packed, LONGEST // (length + 1)):
+        for some in _split(packed, LONGEST // (length + 1)):
             parameters = list(b"".join(some))
-            result = self._guarded(lambda: self._handler.syncWriteTxOnly(
+            result = self._release_after(lambda: self._handler.syncWriteTxOnly(
                 self.port, registers[0].address, length, parameters, len(parameters)))  # noqa: B023
             if result != COMM_SUCCESS:
                 raise BusError(f"could not be sent: {self._handler.getTxRxResult(result)}")
@@ -217,22 +203,22 @@ class Bus:
         """Who answers at which of the family's bit rates; the port's own is set again."""
         wanted, own, found = list(servos), int(self.port.getBaudRate()), {}
         for rate in sorted(set(self.profile.bit_rates.values()), reverse=True):
-            if self._guarded(lambda: self.port.setBaudRate(rate)):  # noqa: B023
+            if self._release_after(lambda: self.port.setBaudRate(rate)):  # noqa: B023
                 here = self.find(wanted)
                 if here:
                     found[rate] = here
-        self._guarded(lambda: self.port.setBaudRate(own))
+        self._release_after(lambda: self.port.setBaudRate(own))
         return found
 
     def answers(self, servo: int) -> int:
         """How many servos seem to answer to one ID, of five pings: 2 where answers are longer than one, or broken, again and
         again."""
         protocol = self.profile.protocol
-        packet, most = ping(protocol, servo), 24 if protocol == 1 else 56
-        heard = [self._guarded(lambda: hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
+        packet, most = wire.ping(protocol, servo), 24 if protocol == 1 else 56
+        heard = [self._release_after(lambda: wire.hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
         if not any(heard):
             return 0
-        return 2 if sum(bool(answer) and not clean(protocol, answer) for answer in heard) >= 3 else 1
+        return 2 if sum(bool(answer) and not wire.clean(protocol, answer) for answer in heard) >= 3 else 1
 
     # Inside
 
@@ -240,6 +226,12 @@ class Bus:
         if name not in self.profile.registers:
             raise BusError(f"{self.profile.name} has no such register", register=name)
         return self.profile.registers[name]
+
+    def _block(self, names: Sequence[str]) -> tuple[list[Register], int, int]:
+        """Registers, and address and length of the shortest piece of the table that holds them."""
+        wanted = [self._register(name) for name in names]
+        first = min(r.address for r in wanted)
+        return wanted, first, max(r.address + r.size for r in wanted) - first
 
     def _write(self, servo: int, name: str, value: int) -> None:
         register = self._register(name)
@@ -256,7 +248,7 @@ class Bus:
         """An answer, asked for again and again; its error byte is the servo's alarms, or a refusal."""
         joint, result = self.joints.get(servo), COMM_SUCCESS
         for attempt in range(self.options.tries):
-            data, result, error = self._guarded(call)
+            data, result, error = self._release_after(call)
             if result == COMM_SUCCESS and len(data) == count:
                 if attempt:
                     self.retries[servo] += attempt
@@ -264,6 +256,8 @@ class Bus:
                 if refused:
                     raise BusError(f"refused: {refused}", servo, joint, register)
                 return data
+            if result in (COMM_RX_CORRUPT, COMM_SUCCESS):
+                self._release_after(lambda: wire.wait_for_silence(self.port))
         how = "only broken answers" if result in (COMM_RX_CORRUPT, COMM_SUCCESS) else "no answer"
         raise NoAnswerError(f"{how} in {self.options.tries} tries", servo, joint, register)
 
@@ -275,7 +269,7 @@ class Bus:
             return ", ".join(name for bit, name in profile.refusals.items() if error >> bit & 1)
         if error & 0x80 and "hardware_error" in profile.registers:
             register = profile.registers["hardware_error"]
-            data, result, _ = self._guarded(
+            data, result, _ = self._release_after(
                 lambda: self._handler.readTxRx(self.port, servo, register.address, register.size))
             bits = register.decode(bytes(data)) if result == COMM_SUCCESS and data else 0
             self.alarms[servo] = tuple(name for bit, name in profile.alarms.items() if bits >> bit & 1) or ("unknown",)
@@ -283,18 +277,18 @@ class Bus:
             self.alarms[servo] = ()
         return profile.refusals.get(error & 0x7F, f"error {error & 0x7F}") if error & 0x7F else ""
 
-    def _guarded(self, call: Callable[[], T]) -> T:
+    def _release_after(self, call: Callable[[], T]) -> T:
         """Whatever happens, the port may be used again afterwards."""
         try:
             return call()
         except BusError:
             raise
         except GONE as e:
-            raise gone(e) from None
+            raise port_gone(e) from None
         finally:
             self.port.is_using = False
 
 
-def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:
+def _split(items: list[bytes], size: int) -> Iterable[list[bytes]]:
     for k in range(0, len(items), max(size, 1)):
         yield items[k:k + size]

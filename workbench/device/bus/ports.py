@@ -43,11 +43,19 @@ WHY = {errno.EACCES: "no permission; are you in the group dialout?", errno.EBUSY
        errno.EAGAIN: "another program has it", errno.EWOULDBLOCK: "another program has it"}
 
 
-class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
-    """dynamixel-sdk's port, opened for one program alone, with a clock that never jumps and time-outs of our own: the bytes' time
-    and `patience` [ms]."""
+class PatientPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
+    """dynamixel-sdk's port with time-outs of our own: the bytes' time and `patience` [ms], instead of the SDK's 34 ms."""
 
     patience = 3.0
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Starts the time-out for an answer of so many bytes."""
+        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
+
+
+class SerialPort(PatientPort):
+    """A serial port, opened for this program alone, with a clock that never jumps."""
+
     is_open: bool
     ser: Any
 
@@ -65,10 +73,6 @@ class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     def getCurrentTime(self) -> float:
         """Milliseconds of the monotonic clock."""
         return time.monotonic() * 1000
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Starts the time-out for an answer of so many bytes."""
-        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
 
     def pause(self, seconds: float) -> None:
         """Lets time go by [s]."""
@@ -117,6 +121,6 @@ def serial_ports(usb: bool = False) -> list[str]:
     return sorted(str(p.device) for p in list_ports.comports() if p.vid is not None or not usb)
 
 
-def gone(error: BaseException) -> PortGoneError:
+def port_gone(error: BaseException) -> PortGoneError:
     """The error to raise where the operating system has lost the adapter."""
     return PortGoneError(f"the adapter has disconnected ({' '.join(str(error).split())}); reconnect it and repeat the command")

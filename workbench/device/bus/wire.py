@@ -18,6 +18,8 @@ SLOWEST = 50.0
 LEAST = 3.0
 """Time-out with the fastest adapter [ms]: occasional delay of a computer that does other things as well."""
 QUESTIONS = 10
+LONGEST_ANSWER = 256
+"""Bytes of the longest packet that any servo sends."""
 
 
 def ping(protocol: int, servo: int) -> bytes:
@@ -64,6 +66,28 @@ def clean(protocol: int, answer: bytes) -> bool:
     if protocol == 1:
         return ~sum(packet[2:-1]) & 0xFF == packet[-1]
     return crc16(packet[:-2]) == int.from_bytes(packet[-2:], "little")
+
+
+def collect(port: Any, packet: bytes, most: int) -> bytes:
+    """Sends and listens until so many bytes are there, or none came for as long as the port has patience."""
+    port.clearPort()
+    port.writePort(list(packet))
+    heard, last = bytearray(), port.getCurrentTime() + len(packet) * port.tx_time_per_byte
+    while len(heard) < most and port.getCurrentTime() < last + port.patience + 70 * port.tx_time_per_byte:
+        got = bytes(port.readPort(most - len(heard)))
+        if got:
+            heard, last = heard + got, port.getCurrentTime()
+    return bytes(heard)
+
+
+def wait_for_silence(port: Any) -> None:
+    """Drops what still comes, until nothing has for as long as the port has patience, or any packet would have ended: whoever
+    asks the next servo while two still answer loses that servo's answer as well."""
+    quiet = port.getCurrentTime() + port.patience
+    end = quiet + LONGEST_ANSWER * port.tx_time_per_byte
+    while port.getCurrentTime() < min(quiet, end):
+        if port.readPort(LONGEST_ANSWER):
+            quiet = port.getCurrentTime() + port.patience
 
 
 def hears_itself(port: Any, protocol: int) -> bool:

@@ -38,10 +38,6 @@ class ServerClock:
     within: float
     drift: float
 
-    def host_time(self, server_time: float, first: float) -> float:
-        """A time of the server's clock on this machine's, where `first` is the server's at the first frame."""
-        return server_time - self.offset - self.drift * (server_time - first)
-
 
 @dataclass(frozen=True)
 class Capture:
@@ -79,7 +75,7 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
     rate, worst = _rate(numbers, times)
     first = float(times[0])
     clock = _clock(stream.echoes, first)
-    first_host = clock.host_time(first, first) if math.isfinite(clock.offset) else first + soonest
+    first_host = first - clock.offset if math.isfinite(clock.offset) else first + soonest
     if until is not None:
         frames = {n: f for n, f in frames.items() if first_host + (f.time - first) <= until}
         if len(frames) < 2:

@@ -35,8 +35,6 @@ class Message(IntEnum):
     REQUEST_MODELDEF = 4
     MODELDEF = 5
     FRAME = 7
-    MESSAGE_STRING = 8
-    DISCONNECT = 9
     KEEP_ALIVE = 10
     ECHO_REQUEST = 12
     ECHO_RESPONSE = 13

@@ -118,7 +118,7 @@ class Loading:
         heard += self._fresh_prompt()
         if not any(name in heard for name in profile.identity):
             raise LoadError(f"the loader says {_excerpt(heard)}, which is no {profile.name} ({profile.source} knows "
-                            f"{_listed(profile.identity)})", self._state, "check which controller this is")
+                            f"{_join(profile.identity)})", self._state, "check which controller this is")
 
     def _fresh_prompt(self) -> bytes:
         """Clears its input line of keys typed after it began to listen: lines are ended until one is answered only by a prompt.
@@ -255,5 +255,5 @@ def _excerpt(heard: bytes) -> str:
     return repr(text)
 
 
-def _listed(texts: tuple[bytes, ...]) -> str:
+def _join(texts: tuple[bytes, ...]) -> str:
     return ", ".join(repr(t.decode()) for t in texts)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.device.bus.errors import BusError
-from workbench.device.bus.ports import GONE, gone
+from workbench.device.bus.ports import GONE, port_gone
 from workbench.device.controller.telemetry import write_telemetry
 from workbench.device.link import (
     AnswerMessage,
@@ -193,7 +193,7 @@ class Controller:
         try:
             self._port.writePort(list(data))
         except GONE as e:
-            raise gone(e) from None
+            raise port_gone(e) from None
 
     def _wait(self, wanted: Callable[[Message], bool], seconds: float) -> Message | None:
         """The first message that is wanted, None after so long; all are kept."""
@@ -206,7 +206,7 @@ class Controller:
             try:
                 data = bytes(self._port.readPort(256))
             except GONE as e:
-                raise gone(e) from None
+                raise port_gone(e) from None
             if not data:
                 self._port.pause(0.001)
             hit = None

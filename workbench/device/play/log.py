@@ -138,8 +138,9 @@ def _position(time: Array, known: Array, values: Array, moved: float) -> Array:
     nearest = np.minimum(np.abs(known[after] - time), np.abs(known[after - 1] - time))
     line = np.interp(time, known, values)
     closest = np.where(np.abs(known[after] - time) < np.abs(known[after - 1] - time), values[after], values[after - 1])
-    near = np.where((gap <= HOLE) & (time >= known[0]) & (time <= known[-1]), line, closest)
-    resting = (time <= moved) & (gap <= 2 * HOLE) & (np.abs(values[after] - values[after - 1]) < STILL)
+    between = (time >= known[0]) & (time <= known[-1])
+    near = np.where((gap <= HOLE) & between, line, closest)
+    resting = between & (time <= moved) & (gap <= 2 * HOLE) & (np.abs(values[after] - values[after - 1]) < STILL)
     out = np.where(nearest <= NEAR, near, np.where(resting, line, np.nan))
     return np.asarray(out, dtype=float)
 

@@ -42,7 +42,8 @@ class Played:
     whether torque is off. unknown: joints that did not confirm it when they were asked. rates: readings of each joint in the
     motion, a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time,
     and poses sent with less than a tenth of their time left. log_problem: why there is no joint log, "" where there is one.
-    log_start: time zero of the log, on the bus's clock [s]; NaN where unknown."""
+    log_start: time zero of the log, on the bus's clock [s]: when it came to rest in neutral or, if it never did, when its first
+    goal was sent; NaN where there was none."""
 
     journal: Path
     started: float

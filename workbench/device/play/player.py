@@ -55,7 +55,7 @@ class _Performance:
         self.read: Counter[str] = Counter()
         self.overtaken, self.missed_before = 0, 0
         self._energised = False
-        self._rested = math.nan
+        self._log_start, self._rested = math.nan, False
 
     def run(self, commands: Commands) -> Played:
         rig, bus = self.rig, self.rig.bus
@@ -89,7 +89,7 @@ class _Performance:
         finally:
             bus.options = kept
         return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown,
-                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before, log_start=self._rested)
+                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before, log_start=self._log_start)
 
     def _rates(self) -> dict[str, float]:
         """Readings of each joint in the motion, a second."""
@@ -107,7 +107,7 @@ class _Performance:
         self._look_at_stop()
         self._energised = True
         rig.limit_torque(self.options.start_torque, check=True)
-        rig.send(self.goals, slow)
+        self._log_start = rig.send(self.goals, slow)
         rig.check_speeds()
         rig.torque(True)
         rig.send(self.goals, slow)  # families that forget a goal while torque is off
@@ -185,7 +185,8 @@ class _Performance:
     def _rest(self) -> None:
         self.progress("resting in neutral", None)
         now = self.rig.bus.now()
-        self._rested = now if math.isnan(self._rested) else self._rested
+        if not self._rested:
+            self._log_start, self._rested = now, True
         self.rig.journal.write(t=now, rest=True)
         self._read_until(self.rig.bus.now() + self.options.rest)
 
@@ -260,6 +261,7 @@ class _Performance:
         try:
             unknown = self.rig.release()
             self.rig.limit_torque(1)
+            self.rig.bus.pause(0.002)
         except (BusError, InputError):
             return False
         return not unknown

@@ -85,10 +85,10 @@ class Rig:
         out = {}
         profile = self.bus.profile
         for joint, servo in self.ids.items():
-            last, agreed = -1, False
+            last, agreed = math.inf, False
             for _ in range(10):
                 position = self.bus.read(servo, "present_position")["present_position"]
-                agreed = last >= 0 and abs(position - last) * profile.count < math.radians(2)
+                agreed = abs(position - last) * profile.count < math.radians(2)
                 last = position
                 if agreed:
                     break

@@ -101,7 +101,7 @@ def write_tables(
         order += f"\n{MOUNTED} {', '.join(f'{joint} {sign:+d} {zero}' for joint, sign, zero in mounted)}"
 
     def text(rows: Counts) -> str:
-        return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
+        return "\n".join([order, f"{len(rows)},", *(f"{_join(row)}," for row in rows)]) + "\n"
 
     binary = {BINARY: encode_table(file)} if file else {}
     return write_together(folder, {
@@ -201,12 +201,12 @@ def _units(path: Path, families: list[str], n: int) -> tuple[ServoUnits, ...]:
 def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
     """Constant arrays for the controller's program; rows are poses, columns are joints in the order of motion_joints."""
     names = ", ".join(json.dumps(joint) for joint in table.joints)
-    ids = _listed([numbers[joint] for joint in table.joints], ", ")
+    ids = _join([numbers[joint] for joint in table.joints], ", ")
 
     families = "\n".join(f"/* {units} */" for units in table.families)
 
     def rows(counts: Counts) -> str:
-        return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)
+        return ",\n".join(f"    {{{_join(row, ', ')}}}" for row in counts)
 
     return f"""\
 /* {len(table)} poses of {len(table.joints)} joints, for a program that sends each pose and then waits for its dwell: the start
@@ -240,11 +240,11 @@ static const uint16_t motion_speeds[MOTION_POSES][MOTION_JOINTS] = {{
 }};
 
 /* What to wait after each pose, ms. */
-static const uint32_t motion_dwells_ms[MOTION_POSES] = {{{_listed(table.dwells_ms, ', ')}}};
+static const uint32_t motion_dwells_ms[MOTION_POSES] = {{{_join(table.dwells_ms, ', ')}}};
 
 #endif
 """
 
 
-def _listed(counts: Iterable[int], comma: str = ",") -> str:
+def _join(counts: Iterable[int], comma: str = ",") -> str:
     return comma.join(str(count) for count in counts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workbench.device.virtual.registers import Kept, emulated
+from workbench.device.virtual.registers import Kept, emulate
 
 _KEPT = {
     "model_number": Kept(12),
@@ -45,4 +45,4 @@ def _bit_rate(value: int) -> int:
     return 2_000_000 // (value + 1)
 
 
-AX12A = emulated("ax12a", "AX-12A", 50, _KEPT, bit_rate=_bit_rate)
+AX12A = emulate("ax12a", "AX-12A", 50, _KEPT, bit_rate=_bit_rate)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from workbench.device.virtual.protocol2 import Protocol2
-from workbench.device.virtual.registers import Kept, emulated
+from workbench.device.virtual.registers import Kept, emulate
 
 _XL330 = {
     "model_number": Kept(1200),
@@ -134,7 +134,7 @@ _MX28 = {
     "punch": Kept(0, (0, 1023)),
 }
 
-MX28 = emulated("mx", "MX-28", 74, _MX28, refresh=0.0)
-XL330 = emulated("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
-XL430 = emulated("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
-STS3215 = emulated("sts3215", "STS3215", 71, _STS3215, refresh=0.0, eeprom_lock=1)
+MX28 = emulate("mx", "MX-28", 74, _MX28, refresh=0.0)
+XL330 = emulate("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
+XL430 = emulate("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
+STS3215 = emulate("sts3215", "STS3215", 71, _STS3215, refresh=0.0, eeprom_lock=1)

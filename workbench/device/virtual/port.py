@@ -7,8 +7,7 @@ from collections import deque
 from collections.abc import Sequence
 from functools import partial
 
-from dynamixel_sdk import PortHandler
-
+from workbench.device.bus.ports import PatientPort
 from workbench.device.virtual.bus import ServoBus
 from workbench.device.virtual.clock import MILLISECOND, SECOND
 
@@ -16,7 +15,22 @@ CHUNK = 62
 """Bytes that an FTDI chip hands over at once, without waiting for more."""
 
 
-class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
+class MemoryPort(PatientPort):
+    """A port without hardware, at any rate; a rate that the other side does not have reads as noise or silence."""
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Sets the rate, and opens."""
+        self.baudrate = cflag_baud
+        self.tx_time_per_byte = 10_000 / cflag_baud
+        self.is_open = True
+        return True
+
+    def closePort(self) -> None:
+        """Closes."""
+        self.is_open = False
+
+
+class VirtualPort(MemoryPort):
     """An adapter such as the U2D2 on a virtual bus; `echo` hears itself, as adapters without direction control do.
 
     unplugged: as if pulled out: raises the operating system's error. latency: longest time that bytes are held, as by an
@@ -53,28 +67,10 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         self._rx.extend(self._kept)
         self._kept.clear()
 
-    def setupPort(self, cflag_baud: int) -> bool:
-        """Any rate will do."""
-        self.baudrate = cflag_baud
-        self.tx_time_per_byte = 10_000 / cflag_baud
-        self.is_open = True
-        return True
-
     def openPort(self) -> bool:
         """Opens; False where it is unplugged."""
         self.is_open = not self.unplugged
         return self.is_open
-
-    def closePort(self) -> None:
-        """Closes."""
-        self.is_open = False
-
-    patience = 3.0
-    """Milliseconds beyond an answer's own bytes until it is late, instead of the SDK's 34."""
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Starts the time-out for an answer of so many bytes."""
-        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
 
     def pause(self, seconds: float) -> None:
         """Lets virtual time go by [s]."""

@@ -87,7 +87,7 @@ def bit_flips(share: float, seed: int = 0) -> Callable[[int], int]:
     """A line that flips one random bit in this share of the bytes that pass."""
     rng = random.Random(seed)
 
-    def passed(value: int) -> int:
+    def flip(value: int) -> int:
         return value ^ (1 << rng.randrange(8)) if rng.random() < share else value
 
-    return passed
+    return flip

@@ -37,7 +37,7 @@ class Protocol2:
             packet = bytes(got[:length + 7])
             got.clear()
             intact = crc16(packet[:-2]) == int.from_bytes(packet[-2:], "little")
-            return Instruction(packet[4], packet[7], _narrow(packet[7], unstuffed(packet[8:-2])), intact)
+            return Instruction(packet[4], packet[7], _narrow(packet[7], unstuff(packet[8:-2])), intact)
 
         return feed
 
@@ -59,17 +59,17 @@ class Protocol2:
 
 def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
     """A whole packet."""
-    body = stuffed(parameters)
+    body = stuff(parameters)
     head = HEADER + bytes([servo]) + (len(body) + 3).to_bytes(2, "little") + bytes([instruction]) + body
     return head + crc16(head).to_bytes(2, "little")
 
 
-def stuffed(parameters: bytes) -> bytes:
+def stuff(parameters: bytes) -> bytes:
     """FF FF FD inside parameters becomes FF FF FD FD."""
     return parameters.replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
 
 
-def unstuffed(parameters: bytes) -> bytes:
+def unstuff(parameters: bytes) -> bytes:
     """The way back."""
     return parameters.replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
 
@@ -82,7 +82,7 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def _shifted(byte: int) -> int:
+def _crc_of_byte(byte: int) -> int:
     """A byte's share of the CRC, bit by bit."""
     crc = byte << 8
     for _ in range(8):
@@ -90,7 +90,7 @@ def _shifted(byte: int) -> int:
     return crc
 
 
-_CRC = tuple(map(_shifted, range(256)))
+_CRC = tuple(map(_crc_of_byte, range(256)))
 
 
 def _narrow(instruction: int, parameters: bytes) -> bytes:

@@ -90,7 +90,7 @@ class VirtualProfile:
         return {r.address + k: (r, k) for r in self.registers for k in range(r.size)}
 
 
-def emulated(file: str, model: str, size: int, kept: Mapping[str, Kept], **own: Any) -> VirtualProfile:
+def emulate(file: str, model: str, size: int, kept: Mapping[str, Kept], **own: Any) -> VirtualProfile:
     """A servo of the family that a file in data/servos describes: addresses, sizes, signs, units and bit rates are the file's,
     `own` holds the properties that only an emulation needs."""
     family = load_profile(data_file(f"servos/{file}.yaml"))

@@ -245,7 +245,7 @@ class VirtualServo:
             if k not in self.profile.at:
                 return RANGE, 0
             touched[self.profile.at[k][0].name] = self.profile.at[k][0]
-        error = self._refused(touched, new)
+        error = self._refusal(touched, new)
         if error:
             return error, 0
         self._table = new
@@ -274,7 +274,7 @@ class VirtualServo:
         self._put(self.profile.by_name["goal_position"], self._count(angle))
         self._steer(self.bus.clock.now)
 
-    def _refused(self, touched: dict[str, Register], new: bytearray) -> int:
+    def _refusal(self, touched: dict[str, Register], new: bytearray) -> int:
         for register in touched.values():
             value = int.from_bytes(new[register.address:register.address + register.size], "little")
             if not register.writable or not register.low <= value <= register.high:
@@ -357,8 +357,8 @@ class VirtualServo:
         if now - self._refreshed >= self.profile.refresh * SECOND:
             self._refreshed, self._latched = now, sense
         speed, load = self._latched.velocity / self.profile.speed_unit, self.profile.full_torque * self._latched.duty
-        put(name["present_speed"], _signed(speed, self.profile.speed_sign, name["present_speed"].size))
-        put(name["present_load"], _signed(load, self.profile.load_sign, name["present_load"].size))
+        put(name["present_speed"], _encode(speed, self.profile.speed_sign, name["present_speed"].size))
+        put(name["present_load"], _encode(load, self.profile.load_sign, name["present_load"].size))
 
     def _steer(self, now: int) -> None:
         on = self.powered and bool(self["torque_enable"])
@@ -373,7 +373,7 @@ class VirtualServo:
             self.body.drive(self.joint, now, drive)
 
 
-def _signed(value: float, sign: int, size: int) -> int:
+def _encode(value: float, sign: int, size: int) -> int:
     """Register content of a number: magnitude and a bit for the sign, or two's complement in so many bytes (sign 0)."""
     if not sign:
         return round(value) % (1 << 8 * size)

@@ -8,7 +8,7 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_source import link_sizes
 
 SHARE = 0.5
-"""Of a link's size, by which a search moves its centre of mass at most: beyond it, one in the middle leaves the link."""
+"""Share of a link's size by which a search may move its centre of mass: beyond it, one in the middle leaves the link."""
 
 
 class ComShift(Effect):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from workbench.effects.base import Effect, Parameter, scalar
-from workbench.effects.schedules import LOOP, delayed
+from workbench.effects.schedules import LOOP, delay_commands
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
 
@@ -26,7 +26,7 @@ class CommandDelay(Effect):
         return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * scalar(spec, 'delay'):.1f} ms late."
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
-        return delayed(commands, [commands.joints.index(j) for j in where] or range(len(commands.joints)), values["delay"])
+        return delay_commands(commands, [commands.joints.index(j) for j in where] or range(len(commands.joints)), values["delay"])
 
 
 EFFECT = CommandDelay()

@@ -9,7 +9,7 @@ from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 
 SHARE = 0.5
-"""Of a link's length, by which a search changes it at most."""
+"""Share of a link's length by which a search may change it."""
 
 
 class LinkLength(Effect):

@@ -11,9 +11,9 @@ from workbench.effects.servo_constant import ServoConstant
 from workbench.robot import EffectSpec, RobotModel
 
 LEAST_DUTY, MOST_DUTY = 0.05, 0.9
-"""Between them a law's steepness shows: less drowns in the counts of position, more may be cut."""
+"""Range of duty in which the gain can be measured: less is lost in the counts of position, more may be saturated."""
 COUNTS = 0.01
-"""Standard error that no register of duty goes below: it is read some milliseconds from the position."""
+"""Least standard error of a duty register, as it is read some milliseconds from the position."""
 
 
 class ServoGain(ServoConstant):

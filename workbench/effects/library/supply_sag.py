@@ -1,4 +1,4 @@
-"""A supply that gives way: its voltage drops with what all servos together draw."""
+"""A weak supply: its voltage drops with the current that all servos draw together."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 from workbench.types import Array
 
 LEAST_DRAWN = 0.3
-"""By which the sum of duties has to change for a log's voltage to tell a sag."""
+"""Least change of the summed duties for a log's voltage to determine a sag."""
 COUNT = 0.05
-"""Standard error [V] that no register of voltage goes below: half of its steps of 0.1 V."""
+"""Least standard error [V] of a voltage register: half of its steps of 0.1 V."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class SupplySag(Effect):
         return f"The supply drops by {scalar(spec, 'drop'):.2f} V for each servo at full duty."
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """How the register of voltage falls with what all servos' duties sum up to."""
+        """The slope of the voltage register over the sum of all servos' duties."""
         drops = []
         for log in logs:
             if log.voltage is None or not log.duty:

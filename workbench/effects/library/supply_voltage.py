@@ -17,7 +17,7 @@ STANDS = 1.5
 """Largest supply voltage, over the voltage at which a servo is rated or said to run: a full pack of two cells on
 a servo rated at 6 V is 1.4; more burns it."""
 REGISTER = 0.1
-"""A step of the voltage that servos measure [V]."""
+"""Resolution of the voltage that servos measure [V]."""
 
 
 class SupplyVoltage(Effect):
@@ -41,7 +41,7 @@ class SupplyVoltage(Effect):
         return STANDS * max(nominal, *(model.servo(j).rated_voltage for j in model.joints)) - nominal
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """The median that servos measured in each log, to a step of their registers."""
+        """The median that servos measured in each log, to the resolution of their registers."""
         seen = [log.voltage[np.isfinite(log.voltage)] for log in logs if log.voltage is not None]
         return mean_of_logs([float(np.median(v)) for v in seen if len(v)], REGISTER)
 

@@ -17,6 +17,7 @@ class ZeroOffset(Effect):
     hidden_by_zeroing = True
     moves_feet = True
     estimator = "turn about an axis"
+    resembles = "gravity against torque"  # seen from a turned servo, gravity leans as on a tilted floor
     # a horn one tooth off: 14.4 deg of 25 teeth
     parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE, seldom_beyond=15.0),)
 

@@ -19,30 +19,37 @@ from workbench.files.option_checks import check_positive, check_whole
 from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM, NAME, plain, read_certificate
 from workbench.gait.draws import bound
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import GaitFamily, Steer
 from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_map, fitted, rows_of
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-from workbench.types import Array, Progress
+from workbench.types import Progress
 
 FILE = "family.json"
+FORMAT = 2
+"""1 had no sideways strides."""
+LIMITS = ("most", "most_change", "most_side", "most_side_change")
+"""What a cycle may be steered by, and by how much more than the one before; names of `DriveOptions`."""
 
 
 @dataclass(frozen=True)
 class FamilyOptions:
     """How a family is certified.
 
-    most: largest turn [rad per stance]; most_change: from one cycle to the next [rad]; both as `DriveOptions` has them. draws:
-    robots; of 20 that stand, fewer than 14 % fall (at 95 %). cycles: of each robot's walk, with turns at random. hold: cycles
-    for which a turn is kept. least_gain: smallest gain of any robot, as a share of the nominal one; with less the plan's turns
-    do not bring the robot back within its horizon. most_gain: largest gain, as a share; at twice the nominal one the loop with
-    its two cycles of delay begins to oscillate. authority: heading change at the largest turn, in scatters of one cycle's
-    heading. grid: turns over the range whose tables are checked against the limits of servos and joints.
+    most: largest turn [rad per stance]; most_change: from one cycle to the next [rad]; most_side, most_side_change: the same of
+    the sideways stride [m per stance]; all as `DriveOptions` has them. draws: robots; of 20 that stand, fewer than 14 % fall (at
+    95 %). cycles: of each robot's walk, with turns at random. hold: cycles for which a turn is kept. least_gain: smallest gain of
+    any robot, as a share of the nominal one; with less the plan's turns do not bring the robot back within its horizon.
+    most_gain: largest gain, as a share; at twice the nominal one the loop with its two cycles of delay begins to oscillate.
+    authority: heading change at the largest turn, in scatters of one cycle's heading. grid: turns over the range whose tables are
+    checked against the limits of servos and joints.
     """
 
     most: float = 0.15
     most_change: float = 0.08
+    most_side: float = 0.008
+    most_side_change: float = 0.003
     draws: int = 20
     cycles: int = 30
     hold: int = 2
@@ -54,18 +61,20 @@ class FamilyOptions:
 
     def __post_init__(self) -> None:
         check_whole(self, draws=1, cycles=8, hold=1, grid=3)
-        check_positive(self, "most", "most_change", "least_gain", "most_gain", "authority", "time_step")
+        check_positive(self, *LIMITS, "least_gain", "most_gain", "authority", "time_step")
 
 
 @dataclass(frozen=True, eq=False)
 class FamilyCertificate:
-    """most, most_change: the turns that were played [rad per stance]. step_map: of the nominal robot. draws: count, falls and the
-    bound that they leave, and over the robots lowest, median and highest of total gain [rad per rad], scatter [rad], speed [m/s]
-    and own turning bias [rad per cycle]. problems: limits that are broken, in words. gait, model_sha256: hashes of the gait's
-    certificate and of the robot."""
+    """most, most_change: the turns that were played [rad per stance]; most_side, most_side_change: the sideways strides [m per
+    stance]. step_map: of the nominal robot. draws: count, falls and the bound that they leave, and over the robots lowest, median
+    and highest of total gain [rad per rad], scatter [rad], speed [m/s] and own turning bias [rad per cycle]. problems: limits
+    that are broken, in words. gait, model_sha256: hashes of the gait's certificate and of the robot."""
 
     most: float
     most_change: float
+    most_side: float
+    most_side_change: float
     step_map: StepMap
     draws: dict[str, Any]
     gait: str
@@ -80,12 +89,13 @@ class FamilyCertificate:
     @property
     def limits(self) -> dict[str, float]:
         """As `DriveOptions` takes them: nothing beyond the turns that were played."""
-        return {"most": self.most, "most_change": self.most_change}
+        return {name: getattr(self, name) for name in LIMITS}
 
     def summary(self) -> str:
         """In a few lines, for a person."""
         d, deg = self.draws, np.degrees
-        lines = [f"turns up to {self.most:g} rad per stance, changes up to {self.most_change:g}: {d['falls']} of {d['count']} "
+        lines = [f"turns up to {self.most:g} rad and sideways strides up to {1000 * self.most_side:g} mm per stance, changes up "
+                 f"to {self.most_change:g} rad and {1000 * self.most_side_change:g} mm: {d['falls']} of {d['count']} "
                  f"random robots fell (below {100 * d['falls at most']:.2g} % at 95 %)"]
         if "gain rad/rad" in d:
             low, middle, high = (deg(g * self.most) for g in d["gain rad/rad"])
@@ -97,7 +107,7 @@ class FamilyCertificate:
 
     def to_json(self) -> dict[str, Any]:
         """As in the file, with the sum that finds changes."""
-        content = plain({"format": 1, "claim": CLAIM, "kept": self.kept, **vars(self), "step_map": vars(self.step_map)})
+        content = plain({"format": FORMAT, "claim": CLAIM, "kept": self.kept, **vars(self), "step_map": vars(self.step_map)})
         return {**content, "sha256": _digest(content)}
 
     def write(self, folder: Path) -> Path:
@@ -112,36 +122,41 @@ def certify_family(family: GaitFamily, gait_sha256: str, ensemble: Ensemble, fol
     cannot be steered."""
     o, model = options or FamilyOptions(), family.machine.model
     progress("the nominal robot", None)
-    nominal = fit_step_map(family, model, seed, MapOptions(most=o.most, hold=o.hold, time_step=o.time_step))
-    turns = bounded_turns(np.random.default_rng([seed, 58]), o)
+    of_map = MapOptions(most=o.most, most_side=o.most_side, hold=o.hold, time_step=o.time_step)
+    nominal = fit_step_map(family, model, seed, of_map)
+    steers = bounded_steers(np.random.default_rng([seed, 58]), o)
     robots = ensemble.draws(model, o.draws, seed, folder)
     config = SimulationConfig(time_step=o.time_step, contact_period=0.0, log_period=0.01)
     seconds = family.start_seconds + o.cycles * family.period
-    jobs = [Job(r, config, family.sequence(list(turns)), seconds) for r in robots]
+    jobs = [Job(r, config, family.sequence(steers), seconds) for r in robots]
     takes = simulate_batch(jobs, progress=lambda done, of: progress(f"drawn robot {done} of {of}", done / of))
-    maps = [fitted(*rows_of(t, turns, family), o.most) for t in takes if not fell(t)]
+    maps = [fitted(*rows_of(t, steers, family), o.most) for t in takes if not fell(t)]
     falls = len(takes) - len(maps)
     draws = {"count": len(takes), "falls": falls, "falls at most": bound(falls, len(takes)), **_spread(maps, family.period)}
     problems = (*broken_limits(family, o), *_problems(nominal, maps, falls, o))
-    return FamilyCertificate(o.most, o.most_change, nominal, draws, gait_sha256, model.sha256, problems)
+    return FamilyCertificate(o.most, o.most_change, o.most_side, o.most_side_change, nominal, draws, gait_sha256, model.sha256,
+                             problems)
 
 
 def broken_limits(family: GaitFamily, o: FamilyOptions) -> list[str]:
-    """Limits of servos and joints that tables break at turns over the whole range, in words; those of the first such turn."""
-    for turn in np.linspace(-o.most, o.most, o.grid):
-        broken = [v for v in check_limits(family.cycle(turn), family.machine.model) if not v.warning]
-        if broken:
-            return [f"turn {turn:+.3f}: {broken[0]}"]
+    """Limits of servos and joints that tables break over the whole range of turns, without a sideways stride and with the
+    largest to each side, in words; those of the first such table."""
+    for side in (0.0, -o.most_side, o.most_side):
+        for turn in np.linspace(-o.most, o.most, o.grid):
+            broken = [v for v in check_limits(family.cycle(Steer(turn, side)), family.machine.model) if not v.warning]
+            if broken:
+                return [f"turn {turn:+.3f}, side {1000 * side:+.1f} mm: {broken[0]}"]
     return []
 
 
-def bounded_turns(rng: np.random.Generator, o: FamilyOptions) -> Array:
-    """Turns (cycles,) at random within the largest turn and the largest change; both limits are met."""
-    out, last = np.zeros(o.cycles), 0.0
-    for k in range(0, o.cycles, o.hold):
-        last = float(np.clip(rng.choice((-1.0, 1.0)) * o.most, last - o.most_change, last + o.most_change))
-        out[k:k + o.hold] = last
-    return out
+def bounded_steers(rng: np.random.Generator, o: FamilyOptions) -> list[Steer]:
+    """Of each of the cycles, at random within the largest turn, sideways stride and changes; all limits are met."""
+    most, change = np.array([o.most, o.most_side]), np.array([o.most_change, o.most_side_change])
+    out, last = list[Steer](), np.zeros(2)
+    for _ in range(0, o.cycles, o.hold):
+        last = np.clip(rng.choice((-1.0, 1.0), 2) * most, last - change, last + change)
+        out += [Steer(*last.tolist())] * o.hold
+    return out[:o.cycles]
 
 
 def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
@@ -150,19 +165,25 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
     at = Path(gait).parent / FILE
     if not at.is_file():
         raise InputError(at, "the family's certificate is missing; `workbench drive --certify --gait MOTION` writes it")
+    text = read_text(at)
     try:
-        content = json.loads(read_text(at))
-        digest = content.pop("sha256")
-        good = content["format"] == 1 and digest == _digest(content)
-        step = content["step_map"]
-        numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
-        step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
-        found = FamilyCertificate(content["most"], content["most_change"], step_map, content["draws"], content["gait"],
-                                  content["model_sha256"], tuple(content["problems"]))
+        content = json.loads(text)
+        digest, known = content.pop("sha256"), content["format"]
+        good = digest == _digest(content)
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
     if not good:
         raise InputError(at, "it was changed after it was written")
+    if known != FORMAT:
+        raise InputError(at, f"format: expected {FORMAT}, got {known}; `workbench drive --certify --gait MOTION` writes it anew")
+    try:
+        step = content["step_map"]
+        numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
+        step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
+        found = FamilyCertificate(*(content[name] for name in LIMITS), step_map, content["draws"], content["gait"],
+                                  content["model_sha256"], tuple(content["problems"]))
+    except (ValueError, KeyError, TypeError, AttributeError) as e:
+        raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
     if found.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({found.model_sha256[:12]}) than this ({model.sha256[:12]})")
     if found.gait != gait_sha256(gait):

@@ -1,7 +1,7 @@
 """Steering once a cycle: a model-predictive controller as a Drake system, and a proportional law to compare it with.
 
-Both run once a cycle. At the end of cycle k, cycle k+1 is already on the controller (an upload takes 0.2 s); they choose the turn
-of cycle k+2. Both estimate the robot's own turning bias, gain and stride (`observer`).
+Both run once a cycle. At the end of cycle k, cycle k+1 is already on the controller (an upload takes 0.2 s); they choose what
+cycle k+2 is steered by. Both estimate the robot's own turning bias, gain and stride (`observer`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from workbench.gait.drive import observer as at
+from workbench.gait.drive.family import Steer
 from workbench.gait.drive.observer import first_state, observed
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
@@ -23,9 +24,9 @@ from workbench.types import Array
 class CycleController(LeafSystem):
     """Ports: `pose` in, x, y [m] and heading [rad] at the end of a cycle, NaN where the cameras lost the robot; `turn` out, of
     the cycle after next [rad per stance]; `state` out, the estimate: x, y, heading, and the robot's turning bias beyond the map's
-    [rad per cycle]; `along` out, distance along the path [m]; `stop` out, 1 where the path ends with
-    the next cycle, which is committed, or the robot was lost;
-    `lost` out, 1 where it was lost.
+    [rad per cycle]; `side` out, the sideways stride of that cycle [m per stance]; `along` out, distance along the path [m];
+    `stop` out, 1 where the path ends with the next cycle, which is committed, or the robot was lost; `lost` out, 1 where it was
+    lost.
 
     Updates every `period` [s], from `period` on. discs: obstacles, which only the law "mpc" avoids.
     """
@@ -38,6 +39,7 @@ class CycleController(LeafSystem):
         self._pose = self.DeclareVectorInputPort("pose", 3)
         self.DeclareDiscreteState(first_state(step_map, self.options))
         self.DeclareVectorOutputPort("turn", 1, self._say(lambda x: x[at.AFTER:at.AFTER + 1]))
+        self.DeclareVectorOutputPort("side", 1, self._say(lambda x: x[at.AFTER_SIDE:at.AFTER_SIDE + 1]))
         self.DeclareVectorOutputPort("state", 4, self._say(lambda x: x[at.X:at.BIAS + 1]))
         self.DeclareVectorOutputPort("along", 1, self._say(lambda x: x[at.ALONG:at.ALONG + 1]))
         self.DeclareVectorOutputPort("stop", 1, self._say(lambda x: np.array([float(self._ends(x))])))
@@ -58,22 +60,26 @@ class CycleController(LeafSystem):
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         x = np.array(context.get_discrete_state(0).value())
         x[at.PLAYED], x[at.NEXT], before = x[at.NEXT], x[at.AFTER], x[at.PLAYED]
+        x[at.PLAYED_SIDE], x[at.NEXT_SIDE] = x[at.NEXT_SIDE], x[at.AFTER_SIDE]
         x = observed(x, np.asarray(self._pose.Eval(context)), before, self.map, self.options)
         x[at.ALONG], left = self.path.project(x[[at.X, at.Y]], x[at.ALONG])
-        x[at.AFTER] = self._decide(x, left)
+        decided = self._decide(x, left)
+        x[at.AFTER], x[at.AFTER_SIDE] = decided.turn, decided.side
         values.set_value(0, x)
         return EventStatus.Succeeded()
 
-    def _decide(self, x: Array, left: float) -> float:
-        """The turn of the cycle after next, from the state at the end of this one: first through the cycle that is committed."""
+    def _decide(self, x: Array, left: float) -> Steer:
+        """For the cycle after next, from the state at the end of this one: first through the cycle that is committed."""
         m, o = self._own(x), self.options
         along, left, heading = self._committed(x, left, m)
         if o.law == "proportional":
-            off = heading - self.path.heading(along) + np.arctan(left / o.reach) + m.aside / m.ahead
+            side = limited(Steer(0.0, -m.aside / m.side_gain if m.side_gain else 0.0), _next(x), o).side
+            off = heading - self.path.heading(along) + np.arctan(left / o.reach) + (m.aside + m.side_gain * side) / m.ahead
             bend = self.path.heading(along + m.ahead) - self.path.heading(along)
-            wanted = bend - (m.bias + x[at.BIAS]) - off * m.ahead / o.reach
-            return limited(wanted / (m.gain + m.memory), x[at.NEXT], o)
-        return limited(self._planned(along, left, heading, x, m).turns[0], x[at.NEXT], o)
+            wanted = bend - (m.bias + x[at.BIAS] + m.side_turns * side) - off * m.ahead / o.reach
+            return limited(Steer(wanted / (m.gain + m.memory), side), _next(x), o)
+        planned = self._planned(along, left, heading, x, m)
+        return limited(Steer(planned.turns[0], planned.sides[0]), _next(x), o)
 
     def _own(self, x: Array) -> StepMap:
         """The map of this robot, as it is estimated."""
@@ -84,14 +90,14 @@ class CycleController(LeafSystem):
         off = x[at.HEADING] - self.path.heading(x[at.ALONG])
         along = x[at.ALONG] + m.ahead
         bend = self.path.heading(along) - self.path.heading(x[at.ALONG])
-        left = left + m.ahead * np.sin(off - bend / 2) + m.aside + m.aside_gain * x[at.NEXT]
-        return along, left, x[at.HEADING] + m.turned(x[at.NEXT], x[at.PLAYED]) + x[at.BIAS]
+        left = left + m.ahead * np.sin(off - bend / 2) + m.aside + m.moved_aside(_next(x))
+        return along, left, x[at.HEADING] + m.turned(_next(x), x[at.PLAYED]) + x[at.BIAS]
 
     def _planned(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
         ahead = np.asarray(along + m.ahead * np.arange(self.options.horizon + 1), float)
         targets = np.array([self.path.heading(s) for s in ahead])
         bounds = corridor(self.path, ahead, left, self.discs, self.options.clearance) if self.discs else None
-        return plan(left, heading, x[at.NEXT], x[at.BIAS], targets, m, self.options, bounds)
+        return plan(left, heading, _next(x), x[at.BIAS], targets, m, self.options, bounds)
 
     def planned_points(self, context: Context) -> Array:
         """Where the plan leads from the present state: positions (N + 1, 2) [m] from the cycle after next on."""
@@ -103,6 +109,16 @@ class CycleController(LeafSystem):
         return np.array([self.path.point(along + m.ahead * j, y) for j, y in enumerate(planned.left)])
 
 
-def limited(turn: float, before: float, options: DriveOptions) -> float:
-    """The turn [rad] clipped to the largest that a table has, and to the largest change between consecutive tables."""
-    return float(np.clip(np.clip(turn, before - options.most_change, before + options.most_change), -options.most, options.most))
+def _next(x: Array) -> Steer:
+    """Of the cycle that is on the controller already."""
+    return Steer(x[at.NEXT], x[at.NEXT_SIDE])
+
+
+def limited(steer: Steer, before: Steer, o: DriveOptions) -> Steer:
+    """Turn and sideways stride clipped to the largest that a table has, and to the largest change between consecutive tables."""
+    return Steer(_clipped(steer.turn, before.turn, o.most, o.most_change),
+                 _clipped(steer.side, before.side, o.most_side, o.most_side_change))
+
+
+def _clipped(value: float, before: float, most: float, change: float) -> float:
+    return float(np.clip(np.clip(value, before - change, before + change), -most, most))

@@ -1,9 +1,9 @@
-"""A family of gaits: one shape whose feet turn the body by more or less in each cycle."""
+"""A family of gaits: one shape whose feet turn the body, and move it to the side, by more or less in each cycle."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,38 +19,52 @@ from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
 """Turns are rounded to this [rad per stance], an eighth of the scatter of one cycle's heading: tables are made once for each."""
+SIDE_RESOLUTION = 0.0005
+"""Sideways strides are rounded to this [m per stance]: 0.8 mm of a cycle's way, a quarter of the scatter of one step."""
 PACE_RESOLUTION = 0.05
 """Paces are rounded to this share of the gait's stride."""
 
 
-class GaitFamily:
-    """Cycles of one gait that differ in `turn` [rad per stance, to the left] and in `pace`, the share of the gait's stride.
+@dataclass(frozen=True)
+class Steer:
+    """What is asked of a cycle beyond the gait's own: turn [rad per stance] and sideways stride [m per stance], to the left."""
 
-    The shape's own turn (its trim) is added to the requested turn. InputError where a table of the family cannot be made, because
-    a goal is beyond the registers. Cycles begin at the pose (`phase` of the shape's cycle) that the joints reach most slowly, as
-    the controller's program changes tables there only if the way is short; the poses before it belong to the start.
+    turn: float = 0.0
+    side: float = 0.0
+
+
+STRAIGHT = Steer()
+
+
+class GaitFamily:
+    """Cycles of one gait that differ in what they are steered by (`Steer`) and in `pace`, the share of the gait's stride.
+
+    The shape's own turn (its trim) and sideways stride are added to the requested ones. InputError where a table of the family
+    cannot be made, because a goal is beyond the registers. Cycles begin at the pose (`phase` of the shape's cycle) that the
+    joints reach most slowly, as the controller's program changes tables there only if the way is short; the poses before it
+    belong to the start.
     """
 
     def __init__(self, machine: GaitMachine, shape: GaitShape) -> None:
         self.machine, self.shape = machine, shape
-        self._tables: dict[tuple[int, int], GaitTable] = {}
-        self.phase = _calmest(self._table(0.0).cycle)
+        self._tables: dict[tuple[int, int, int], GaitTable] = {}
+        self.phase = _calmest(self._table(STRAIGHT).cycle)
 
-    def cycle(self, turn: float, before: float = 0.0, pace: float = 1.0, pace_before: float = 1.0) -> PoseTable:
-        """One cycle after one with the turn and pace `before`, whose last goals are elsewhere: the joints' speeds into its first
-        pose are those of that way. The controller's program checks that the pose is within reach of them."""
-        return self._entered(self._loop(turn, pace), self._loop(before, pace_before))
+    def cycle(self, steer: Steer = STRAIGHT, before: Steer = STRAIGHT, pace: float = 1.0, pace_before: float = 1.0) -> PoseTable:
+        """One cycle after one steered by `before` at `pace_before`, whose last goals are elsewhere: the joints' speeds into its
+        first pose are those of that way. The controller's program checks that the pose is within reach of them."""
+        return self._entered(self._loop(steer, pace), self._loop(before, pace_before))
 
-    def stop(self, before: float = 0.0) -> PoseTable:
-        """From a cycle with the turn `before` to neutral, going straight."""
-        straight = self._table(0.0)
+    def stop(self, before: Steer = STRAIGHT) -> PoseTable:
+        """From a cycle steered by `before` to neutral, going straight."""
+        straight = self._table(STRAIGHT)
         rest = _part(straight.cycle, slice(self.phase, None))
         return self._entered(joined([rest, straight.stop], "drive"), self._loop(before, 1.0))
 
     @property
     def start(self) -> PoseTable:
         """From neutral into the gait, going straight."""
-        straight = self._table(0.0)
+        straight = self._table(STRAIGHT)
         return joined([straight.start, _part(straight.cycle, slice(0, self.phase))], "drive") if self.phase else straight.start
 
     @property
@@ -61,26 +75,30 @@ class GaitFamily:
     @property
     def period(self) -> float:
         """Of one cycle [s], the same for all of the family."""
-        return self._table(0.0).period
+        return self._table(STRAIGHT).period
 
-    def sequence(self, turns: Sequence[float]) -> Commands:
-        """The start, and a cycle for each of `turns` [rad per stance], as one schedule."""
-        cycles = [self.cycle(u, before) for before, u in zip((0.0, *turns), turns)]
+    def sequence(self, steers: Sequence[Steer]) -> Commands:
+        """The start, and a cycle for each of `steers`, as one schedule."""
+        cycles = [self.cycle(u, before) for before, u in zip((STRAIGHT, *steers), steers)]
         return joined([self.start, *cycles], "drive").commands(1)
 
-    def shape_of(self, turn: float, pace: float = 1.0) -> GaitShape:
-        """The shape whose cycles have this turn and pace, rounded as the family's tables are."""
-        turn, pace = round(turn / RESOLUTION) * RESOLUTION, round(pace / PACE_RESOLUTION) * PACE_RESOLUTION
-        return replace(self.shape, turn=self.shape.turn + turn, stride=self.shape.stride * pace)
+    def shape_of(self, steer: Steer, pace: float = 1.0) -> GaitShape:
+        """The shape whose cycles are steered so and have this pace, rounded as the family's tables are."""
+        turn, side, share = self._key(steer, pace)
+        return replace(self.shape, turn=self.shape.turn + turn * RESOLUTION, side=self.shape.side + side * SIDE_RESOLUTION,
+                       stride=self.shape.stride * share * PACE_RESOLUTION)
 
-    def _table(self, turn: float, pace: float = 1.0) -> GaitTable:
-        key = round(turn / RESOLUTION), round(pace / PACE_RESOLUTION)
+    def _key(self, steer: Steer, pace: float) -> tuple[int, int, int]:
+        return round(steer.turn / RESOLUTION), round(steer.side / SIDE_RESOLUTION), round(pace / PACE_RESOLUTION)
+
+    def _table(self, steer: Steer, pace: float = 1.0) -> GaitTable:
+        key = self._key(steer, pace)
         if key not in self._tables:
-            self._tables[key] = gait_table(self.machine, self.shape_of(turn, pace), "drive")
+            self._tables[key] = gait_table(self.machine, self.shape_of(steer, pace), "drive")
         return self._tables[key]
 
-    def _loop(self, turn: float, pace: float) -> PoseTable:
-        cycle = self._table(turn, pace).cycle
+    def _loop(self, steer: Steer, pace: float) -> PoseTable:
+        cycle = self._table(steer, pace).cycle
         return _part(cycle, np.roll(np.arange(len(cycle)), -self.phase))
 
     def _entered(self, table: PoseTable, before: PoseTable) -> PoseTable:

@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context
 
 from workbench.compare.metrics import heading
 from workbench.gait.drive.controller import CycleController
+from workbench.gait.drive.family import STRAIGHT, Steer
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.walk import Seen, StoppedError, Walk
 from workbench.recording.take import Take
@@ -29,13 +30,15 @@ loop."""
 @dataclass(frozen=True, eq=False)
 class Driven:
     """What came of it. poses (K, 3): x, y [m], heading [rad] at the end of each cycle, true; seen (K, 3): as captured; turns (K,)
-    played in the cycle that ends there [rad per stance]; left (K,) [m], off (K,) [rad], along (K,) [m]: true errors from the
-    path; bias (K,): estimated [rad per cycle], NaN if not steered. reason: why it stopped. take: the whole run."""
+    [rad per stance] and sides (K,) [m per stance] of the cycle that ends there; left (K,) [m], off (K,) [rad], along (K,) [m]:
+    true errors from the path; bias (K,): estimated [rad per cycle], NaN if not steered. reason: why it stopped. take: the whole
+    run."""
 
     path: WayPath
     poses: Array
     seen: Array
     turns: Array
+    sides: Array
     left: Array
     off: Array
     along: Array
@@ -94,25 +97,26 @@ def drive(walk: Walk, path: WayPath, controller: CycleController, most_cycles: i
             walk.end()
     except StoppedError as e:
         reason = e.reason
-    columns = np.array(rows).reshape(-1, 11).T
-    turns, left, off, along, biases = columns[6:]
-    return Driven(path, columns[:3].T, columns[3:6].T, turns, left, off, along, biases, reason, walk.take())
+    columns = np.array(rows).reshape(-1, 12).T
+    turns, sides, left, off, along, biases = columns[6:]
+    return Driven(path, columns[:3].T, columns[3:6].T, turns, sides, left, off, along, biases, reason, walk.take())
 
 
 def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles: int, steer: bool, rows: list[list[float]],
             progress: Progress, watch: Watch | None) -> str:
     """Start and cycles, up to the last one before the stop; a row for each end of a cycle. Returns why it ends."""
     context, seen = controller.CreateDefaultContext(), walk.begin()
-    played = committed = near = 0.0  # turns of the cycle that has ended and of the next, which is on the controller already
-    reason = ""
+    played = committed = STRAIGHT  # the cycle that has ended, and the next, which is on the controller already
+    near, reason = 0.0, ""
     for k in range(most_cycles + 1):
         if seen.fell:
             return FELL
         left = math.nan
         if np.isfinite(seen.pose).all():
             near, left = path.project(seen.pose[:2], near)
-        after, bias, ends = _decided(controller, context, seen.captured) if steer else (0.0, math.nan, "")
-        rows.append([*seen.pose, *seen.captured, played, left, _wrapped(seen.pose[2] - path.heading(near)), near, bias])
+        after, bias, ends = _decided(controller, context, seen.captured) if steer else (STRAIGHT, math.nan, "")
+        off = _wrapped(seen.pose[2] - path.heading(near))
+        rows.append([*seen.pose, *seen.captured, played.turn, played.side, left, off, near, bias])
         progress(f"cycle {k + 1}", min(near / path.length, 1.0))
         if watch is not None:
             watch(seen, controller.planned_points(context) if steer else np.empty((0, 2)))
@@ -126,13 +130,14 @@ def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles:
     return reason
 
 
-def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[float, float, str]:
-    """One update: the turn of the cycle after next [rad], the estimated bias [rad per cycle], and the reason to stop or ""."""
+def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[Steer, float, str]:
+    """One update: what the cycle after next is steered by, the estimated bias [rad per cycle], and the reason to stop or ""."""
     controller.GetInputPort("pose").FixValue(context, seen)
     context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
-    turn, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context)) for n in ("turn", "state", "stop", "lost"))
+    turn, side, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context))
+                                     for n in ("turn", "side", "state", "stop", "lost"))
     why = "lost by the cameras" if lost[0] else END
-    return float(turn[0]), float(state[3]), why if stop[0] else ""
+    return Steer(float(turn[0]), float(side[0])), float(state[3]), why if stop[0] else ""
 
 
 def _wrapped(angle: float) -> float:

@@ -1,4 +1,4 @@
-"""The turns of the next cycles: a quadratic programme on Drake's `MathematicalProgram`, solved by Clarabel."""
+"""What the next cycles are steered by: a quadratic programme on Drake's `MathematicalProgram`, solved by Clarabel."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
+from workbench.gait.drive.family import Steer
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.step_map import StepMap
@@ -25,10 +26,11 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """turns (N,) [rad per stance] of the next N cycles; left (N + 1,) [m] from the path and heading error off (N + 1,) [rad] at
-    each cycle's beginning and after the last."""
+    """turns (N,) [rad per stance] and sides (N,) [m per stance] of the next N cycles; left (N + 1,) [m] from the path and heading
+    error off (N + 1,) [rad] at each cycle's beginning and after the last."""
 
     turns: Array
+    sides: Array
     left: Array
     off: Array
 
@@ -51,48 +53,52 @@ def corridor(path: WayPath, along: Array, left: float, discs: Sequence[Disc], cl
     return low, high
 
 
-def plan(left: float, heading: float, before: float, bias: float, targets: Array, m: StepMap, o: DriveOptions,
+def plan(left: float, heading: float, before: Steer, bias: float, targets: Array, m: StepMap, o: DriveOptions,
          bounds: tuple[Array, Array] | None = None) -> Planned:
-    """The turns of the next N cycles.
+    """Turns and sideways strides of the next N cycles.
 
-    left: lateral error [m], heading [rad] where the first of them begins; before: turn of the cycle before it [rad]; bias: of the
+    left: lateral error [m], heading [rad] where the first of them begins; before: of the cycle before it; bias: of the
     robot beyond the map's [rad per cycle]; targets (N + 1,): heading of the path at each cycle's beginning and after the last
     [rad]; bounds: of the lateral position (N + 1,) each [m]. In errors e = heading - target:
 
-        left(j+1) = left(j) + ahead · (e(j) - bend(j)/2) + aside + aside_gain · u(j),  bend(j) = target(j+1) - target(j)
-        e(j+1) = e(j) + bias + gain u(j) + memory u(j-1) - bend(j)
-        minimise sum (left/aside weight)² + (e/turned weight)² + (change of u/change weight)² + inside · (way out of bounds)
-        within limits on u and its change
+        left(j+1) = left(j) + ahead · (e(j) - bend(j)/2) + aside + aside_gain · u(j) + side_gain · v(j)
+        e(j+1) = e(j) + bias + gain u(j) + memory u(j-1) + side_turns · v(j) - bend(j),  bend(j) = target(j+1) - target(j)
+        minimise sum (left/aside weight)² + (e/turned weight)² + (change of u/change weight)² + (change of v/its weight)²
+                     + inside · (way out of bounds)
+        within limits on the turns u, the sideways strides v, and their changes
 
     On an arc that the robot follows exactly, the path moves aside by ahead · bend/2 in each cycle, as the robot does.
     """
     N = len(targets) - 1
     program = MathematicalProgram()
-    u, y, e = (program.NewContinuousVariables(n, name) for n, name in ((N, "turn"), (N + 1, "left"), (N + 1, "heading error")))
+    u, v = (program.NewContinuousVariables(N, name) for name in ("turn", "side"))
+    y, e = (program.NewContinuousVariables(N + 1, name) for name in ("left", "heading error"))
     first = np.arctan2(np.sin(heading - targets[0]), np.cos(heading - targets[0]))
     program.AddBoundingBoxConstraint([left, first], [left, first], [y[0], e[0]])
     own, turning = m.bias + bias, np.diff(targets)
     I, before_u, steps = np.eye(N), np.eye(N, k=-1), np.diff(np.eye(N + 1), axis=0)
-    moved = np.hstack([steps, -m.ahead * np.eye(N, N + 1), -m.aside_gain * I])
-    program.AddLinearEqualityConstraint(moved, m.aside - m.ahead * turning / 2, np.concatenate([y, e, u]))
-    turned = np.hstack([steps, -m.gain * I - m.memory * before_u])
+    moved = np.hstack([steps, -m.ahead * np.eye(N, N + 1), -m.aside_gain * I, -m.side_gain * I])
+    program.AddLinearEqualityConstraint(moved, m.aside - m.ahead * turning / 2, np.concatenate([y, e, u, v]))
+    turned = np.hstack([steps, -m.gain * I - m.memory * before_u, -m.side_turns * I])
     right = own - turning
-    right[0] += m.memory * before
-    program.AddLinearEqualityConstraint(turned, right, np.concatenate([e, u]))
-    program.AddBoundingBoxConstraint(-o.most, o.most, u)
+    right[0] += m.memory * before.turn
+    program.AddLinearEqualityConstraint(turned, right, np.concatenate([e, u, v]))
     D = I - before_u
-    start = np.zeros(N)
-    start[0] = before
-    program.AddLinearConstraint(D, start - o.most_change, start + o.most_change, u)
+    for w, first_w, most, change, weight in ((u, before.turn, o.most, o.most_change, o.change),
+                                             (v, before.side, o.most_side, o.most_side_change, o.side_change)):
+        start = np.zeros(N)
+        start[0] = first_w
+        program.AddBoundingBoxConstraint(-most, most, w)
+        program.AddLinearConstraint(D, start - change, start + change, w)
+        program.Add2NormSquaredCost(D / weight, start / weight, w)
     program.AddQuadraticErrorCost(np.eye(N + 1) / o.aside**2, np.zeros(N + 1), y)
     program.AddQuadraticErrorCost(np.eye(N + 1) / o.turned**2, np.zeros(N + 1), e)
-    program.Add2NormSquaredCost(D / o.change, start / o.change, u)
     if bounds is not None:
         _add_bounds(program, y, bounds, o)
     result = ClarabelSolver().Solve(program)
-    if not result.is_success():  # the limits on u alone are always met together
+    if not result.is_success():  # the limits on turns and sides alone are always met together
         raise RuntimeError(f"the quadratic programme of {N} cycles was not solved: {result.get_solution_result()}")
-    return Planned(*(np.asarray(result.GetSolution(v)) for v in (u, y, e)))
+    return Planned(*(np.asarray(result.GetSolution(w)) for w in (u, v, y, e)))
 
 
 def _add_bounds(program: MathematicalProgram, y: Array, bounds: tuple[Array, Array], o: DriveOptions) -> None:

@@ -17,7 +17,7 @@ from workbench.device.link import LogMessage
 from workbench.device.tables.limits import refuse_broken_limits
 from workbench.device.tables.table_file import JointBounds, TableFile, table_file
 from workbench.files.option_checks import check_positive, check_whole
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import GaitFamily, Steer
 from workbench.gait.drive.walk import Seen, StoppedError
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
@@ -73,7 +73,7 @@ class ControllerWalk:
     def begin(self) -> Seen:
         """Uploads start and first cycle, goes to neutral, plays the start section."""
         self._tell("uploading", None)
-        first = self._file(PoseTable.in_sections(self.family.start, self.family.cycle(0.0), None), self.options.unattended)
+        first = self._file(PoseTable.in_sections(self.family.start, self.family.cycle(), None), self.options.unattended)
         self._bounds = first.joints
         try:
             self._tell("to neutral", None)
@@ -84,13 +84,13 @@ class ControllerWalk:
         except StopAskedError as e:
             raise StoppedError(e.reason) from None
 
-    def cycle(self, turn: float, after: float | None) -> Seen:
-        """While a cycle plays, sends the one after it: turned by `after`, or with None the stop. turn: as was said before."""
+    def cycle(self, steer: Steer, after: Steer | None) -> Seen:
+        """While a cycle plays, sends the one after it: steered by `after`, or with None the stop. steer: as was said before."""
         try:
             if after is None:
-                self.controller.send_next(self._file(self.family.stop(turn), 1))
+                self.controller.send_next(self._file(self.family.stop(steer), 1))
             else:
-                self.controller.send_next(self._file(self.family.cycle(after, turn), self.options.unattended))
+                self.controller.send_next(self._file(self.family.cycle(after, steer), self.options.unattended))
             self._ends += self.family.period
             return self._at_end()
         except StopAskedError as e:

@@ -1,21 +1,22 @@
-"""The step-to-step map: heading change and displacement of one cycle of the gait as functions of the requested turn.
+"""The step-to-step map: heading change and displacement of one cycle of the gait as functions of what it is steered by.
 
-    heading(k+1) = heading(k) + bias + gain · turn(k) + memory · turn(k-1)
-    ahead, aside of one cycle, in the body's frame at its beginning: means, and aside changes with turn
+    heading(k+1) = heading(k) + bias + gain · turn(k) + memory · turn(k-1) + side_turns · side(k)
+    aside(k) = aside + aside_gain · turn(k) + side_gain · side(k), ahead its mean: in the body's frame at the cycle's beginning
 
-fitted by least squares to rollouts in which each cycle's turn is drawn at random. Its residuals are the gait's own scatter from
-cycle to cycle, which no controller that acts once a cycle can remove.
+fitted by least squares to rollouts in which each cycle's turn and sideways stride are drawn at random. Its residuals are the
+gait's own scatter from cycle to cycle, which no controller that acts once a cycle can remove.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from workbench.compare.metrics import heading
 from workbench.files import InputError
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import GaitFamily, Steer
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -26,23 +27,25 @@ from workbench.types import Array
 class MapOptions:
     """How the map is fitted.
 
-    cycles: of each rollout; 30 give each of four numbers some twenty independent samples. rollouts: of one model. most: largest
-    turn asked [rad per stance]; beyond 0.15 the puppy's feet leave their reach. hold: cycles for which a turn is kept, so that
-    both gain and memory show. time_step: of the simulation [s].
+    cycles: of each rollout; 30 give each of five numbers some fifteen independent samples. rollouts: of one model. most: largest
+    turn asked [rad per stance]; beyond 0.15 the puppy's feet leave their reach. most_side: largest sideways stride asked [m per
+    stance]. hold: cycles for which both are kept, so that gain and memory show. time_step: of the simulation [s].
     """
 
     cycles: int = 30
     rollouts: int = 3
     most: float = 0.15
+    most_side: float = 0.008
     hold: int = 2
     time_step: float = 1e-3
 
 
 @dataclass(frozen=True)
 class StepMap:
-    """bias [rad per cycle], gain and memory [rad per rad of turn], ahead and aside [m per cycle], aside_gain [m per rad of turn];
-    scatter: standard deviation of one cycle's heading change [rad] and of its aside [m] about the map. most: largest turn [rad]
-    that it was fitted to."""
+    """bias [rad per cycle], gain and memory [rad per rad of turn], ahead and aside [m per cycle], aside_gain [m per rad of turn],
+    side_gain [m per m of sideways stride], side_turns [rad per m]: both 0 where sideways strides were not asked; scatter:
+    standard deviation of one cycle's heading change [rad] and of its aside [m] about the map. most: largest turn [rad] that it
+    was fitted to."""
 
     bias: float
     gain: float
@@ -52,10 +55,16 @@ class StepMap:
     aside_gain: float
     scatter: tuple[float, float]
     most: float
+    side_gain: float = 0.0
+    side_turns: float = 0.0
 
-    def turned(self, turn: float, before: float) -> float:
-        """Heading change of a cycle [rad], without the robot's own bias beyond the map's."""
-        return self.bias + self.gain * turn + self.memory * before
+    def turned(self, steer: Steer, before: float) -> float:
+        """Heading change of a cycle [rad] after one with the turn `before`, without the robot's own bias beyond the map's."""
+        return self.bias + self.gain * steer.turn + self.memory * before + self.side_turns * steer.side
+
+    def moved_aside(self, steer: Steer) -> float:
+        """How far a cycle moves aside [m] beyond `aside`."""
+        return self.aside_gain * steer.turn + self.side_gain * steer.side
 
 
 def cycle_poses(take: Take, begin: float, period: float, cycles: int) -> Array:
@@ -72,26 +81,27 @@ def fit_step_map(family: GaitFamily, model: RobotModel, seed: int = 0, options: 
     """The map of one robot. InputError where the robot falls, or steering does nothing to it."""
     options = options or MapOptions()
     rng = np.random.default_rng(seed)
-    drawn = rng.uniform(-options.most, options.most, (options.rollouts, -(-options.cycles // options.hold)))
-    turns = np.repeat(drawn, options.hold, axis=1)[:, :options.cycles]
+    drawn = rng.uniform(-1.0, 1.0, (options.rollouts, -(-options.cycles // options.hold), 2)) * [options.most, options.most_side]
+    asked = [[Steer(*u) for u in rows] for rows in np.repeat(drawn, options.hold, axis=1)[:, :options.cycles].tolist()]
     config = SimulationConfig(time_step=options.time_step, contact_period=0.0, log_period=0.01)
     begin = family.start_seconds
     seconds = begin + options.cycles * family.period
-    takes = simulate_batch([Job(model, config, family.sequence(list(u)), seconds) for u in turns])
+    takes = simulate_batch([Job(model, config, family.sequence(u), seconds) for u in asked])
     rows, changes = [], []
-    for take, asked in zip(takes, turns):
+    for take, steers in zip(takes, asked):
         if fell(take):
             raise InputError(None, "the robot falls while its turning is varied; this gait cannot be steered")
-        A, moved = rows_of(take, asked, family)
+        A, moved = rows_of(take, steers, family)
         rows.append(A)
         changes.append(moved)
     return fitted(np.concatenate(rows), np.concatenate(changes), options.most, steered=True)
 
 
-def rows_of(take: Take, turns: Array, family: GaitFamily) -> tuple[Array, Array]:
-    """Rows for `fitted` of a take that played these turns, without the first two cycles, which the start still moves."""
-    moved = increments(cycle_poses(take, family.start_seconds, family.period, len(turns)))
-    return np.column_stack([np.ones(len(turns) - 1), turns[1:], turns[:-1]])[1:], moved[2:]
+def rows_of(take: Take, steers: Sequence[Steer], family: GaitFamily) -> tuple[Array, Array]:
+    """Rows for `fitted` of a take that was steered so, without the first two cycles, which the start still moves."""
+    moved = increments(cycle_poses(take, family.start_seconds, family.period, len(steers)))
+    turns, sides = np.array([[u.turn, u.side] for u in steers]).T
+    return np.column_stack([np.ones(len(turns) - 1), turns[1:], turns[:-1], sides[1:]])[1:], moved[2:]
 
 
 def increments(poses: Array) -> Array:
@@ -103,18 +113,20 @@ def increments(poses: Array) -> Array:
 
 
 def fitted(A: Array, changes: Array, most: float, steered: bool = False) -> StepMap:
-    """Least squares: A (N, 3) of ones, turns and the turns before [rad]; changes (N, 3) as `increments` gives them. steered:
-    InputError where the largest turn changes the heading by less than its scatter."""
+    """Least squares: A (N, 4) of ones, turns and the turns before [rad], and sideways strides [m]; changes (N, 3) as `increments`
+    gives them. steered: InputError where the largest turn changes the heading by less than its scatter."""
+    here = A[:, [0, 1, 3]]
     turning, *_ = np.linalg.lstsq(A, changes[:, 2], rcond=None)
-    side, *_ = np.linalg.lstsq(A[:, :2], changes[:, 1], rcond=None)
-    left = float(np.std(changes[:, 2] - A @ turning, ddof=3)), float(np.std(changes[:, 1] - A[:, :2] @ side, ddof=2))
+    side, *_ = np.linalg.lstsq(here, changes[:, 1], rcond=None)
+    left = float(np.std(changes[:, 2] - A @ turning, ddof=4)), float(np.std(changes[:, 1] - here @ side, ddof=3))
     gain = float(turning[1])
     if steered and abs(gain) * most < left[0]:
         turns, scatter = np.rad2deg(abs(gain) * most), np.rad2deg(left[0])
         raise InputError(None, f"steering by {most:g} rad turns this gait by {turns:.1f} deg a cycle, less than its scatter "
                                f"({scatter:.1f} deg); it cannot be steered")
     ahead = float(changes[:, 0].mean())
-    return StepMap(float(turning[0]), gain, float(turning[2]), ahead, float(side[0]), float(side[1]), left, most)
+    return StepMap(float(turning[0]), gain, float(turning[2]), ahead, float(side[0]), float(side[1]), left, most,
+                   float(side[2]), float(turning[3]))
 
 
 def fell(take: Take) -> bool:

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from workbench.compare.metrics import heading
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import STRAIGHT, GaitFamily, Steer
 from workbench.motion import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -57,9 +57,8 @@ class Walk(Protocol):
         """Plays the start section."""
         ...
 
-    def cycle(self, turn: float, after: float | None) -> Seen:
-        """Plays a cycle with `turn`, as requested before, while one with `after` [rad per stance], or with None the stop, is
-        made ready."""
+    def cycle(self, steer: Steer, after: Steer | None) -> Seen:
+        """Plays a cycle steered by `steer`, as requested before, while one with `after`, or with None the stop, is made ready."""
         ...
 
     def end(self) -> None:
@@ -81,7 +80,7 @@ class SimulatedWalk:
         self.family, self.cameras, self._rng = family, cameras or Cameras(), np.random.default_rng(seed)
         period_ms, start_ms = round(1000 * family.period), round(1000 * family.start_seconds)
         self.config = SimulationConfig(time_step=1e-3, contact_period=0.0, log_period=math.gcd(period_ms, start_ms, 10) / 1000)
-        self._robot, self._turn = robot, 0.0
+        self._robot, self._steer = robot, STRAIGHT
         self._played: list[tuple[Commands, float]] = []
         self._run: SteppedRun | CompiledSteppedRun
         try:
@@ -94,15 +93,15 @@ class SimulatedWalk:
         self._play(self.family.start.commands(1), self.family.start_seconds)
         return self._seen()
 
-    def cycle(self, turn: float, after: float | None) -> Seen:
+    def cycle(self, steer: Steer, after: Steer | None) -> Seen:
         """Plays a cycle; `after` needs no preparation here."""
-        self._play(self.family.cycle(turn, self._turn).commands(1), self.family.period)
-        self._turn = turn
+        self._play(self.family.cycle(steer, self._steer).commands(1), self.family.period)
+        self._steer = steer
         return self._seen()
 
     def end(self) -> None:
         """Plays the stop section."""
-        stop = self.family.stop(self._turn).commands(1)
+        stop = self.family.stop(self._steer).commands(1)
         self._play(stop, stop.end)
 
     def take(self) -> Take:

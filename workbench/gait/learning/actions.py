@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.family import GaitFamily, Steer
 from workbench.gait.learning.options import LearningOptions
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table, pose_table
@@ -53,11 +53,12 @@ class CycleActions:
     def commands(self, k: int, action: Array, before: Array) -> Commands:
         """One cycle."""
         (turn, pace), (turn_before, pace_before) = self._meant(action), self._meant(before)
-        return self.family.cycle(turn, turn_before, pace, pace_before).commands(1)
+        return self.family.cycle(Steer(turn), Steer(turn_before), pace, pace_before).commands(1)
 
     def shape(self, mean: Array) -> GaitShape:
         """The gait with that turn and pace."""
-        return self.family.shape_of(*self._meant(mean[0]))
+        turn, pace = self._meant(mean[0])
+        return self.family.shape_of(Steer(turn), pace)
 
     def _meant(self, action: Array) -> tuple[float, float]:
         """Turn [rad per stance] and pace."""

@@ -49,7 +49,8 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
         new = suspects(evaluator, now, lost, cleared)
         if not new:
             break
-        after = _played(evaluator, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
+        both = {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}
+        after = _residuals_without(evaluator, nominal, both, residuals)
         guilty = {(i, j): tuple(k for k in poses if _is_explained(evaluator.evidence[i], j, k, now[i], after[i]))
                   for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
@@ -57,11 +58,11 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
         if not found:
             break
         lost |= found
-        now = after if guilty == new else _played(evaluator, nominal, lost, residuals)
+        now = after if guilty == new else _residuals_without(evaluator, nominal, lost, residuals)
     return lost
 
 
-def _played(
+def _residuals_without(
     evaluator: RolloutEvaluator, nominal: RobotModel, lost: DroppedPoses, residuals: Mapping[int, Array]
 ) -> dict[int, Array]:
     """Residuals without these poses."""

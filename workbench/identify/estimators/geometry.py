@@ -22,7 +22,7 @@ from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
 from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import seen_joints, tracks_of, turned
+from workbench.recording.mocap.tracks import seen_joints, tracks_of, turn_vectors
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 from workbench.types import Array
@@ -89,7 +89,7 @@ class Geometry:
         """The model with the measured deviations."""
         return model.with_effects((*model.effects, *(m.spec for m in self.measured)))
 
-    def asked(self, pool: Sequence[Candidate]) -> list[Candidate]:
+    def select_untried(self, pool: Sequence[Candidate]) -> list[Candidate]:
         """The candidates of a pool that must still be tried."""
         known = self.as_drawn | {(m.effect, (m.where,)) for m in self.measured}
         return [replace(c, typical=(self.near[c.key],)) if c.key in self.near else c for c in pool if c.key not in known]
@@ -111,14 +111,15 @@ def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: 
         for where, number in estimates.items():
             if number.is_nothing(least):
                 as_drawn.add((name, (where,)))
-            elif number.differs(least) and effect.hidden_by_zeroing and ill & set(model.kinematics.chain(_carried(model, where))):
+            elif number.differs(least) and effect.hidden_by_zeroing and ill & set(
+                    model.kinematics.chain(_child_link(model, where))):
                 near[name, (where,)] = number.value / unit
             elif number.differs(least):
                 measured.append(Measured(name, where, number.value / unit, number.sigma / unit))
     return Geometry(tuple(measured), near, frozenset(as_drawn))
 
 
-def _carried(model: RobotModel, joint: str) -> str:
+def _child_link(model: RobotModel, joint: str) -> str:
     return model.kinematics.frames[joint].child
 
 
@@ -132,7 +133,7 @@ def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainV
     k, sdf = model.kinematics, SdfRobot(model.path)
     estimates: dict[str, list[UncertainValue]] = {}
     for s in between:
-        link, drawn = k.frames[s.joint].child, _drawn(k, s)
+        link, drawn = k.frames[s.joint].child, _offset_across(k, s)
         way, distance = sdf.way(k, link), float(np.linalg.norm(drawn))
         along = float(drawn @ way) / (distance * float(np.linalg.norm(way))) if distance > 0 and way.any() else 0.0
         if along > READ_OFF.least_along:
@@ -153,7 +154,7 @@ def _turns(model: RobotModel, fixed: Sequence[tuple[TakeEvidence, Sequence[Span]
         for s in between:
             f = k.frames[s.joint]
             axis = start[model.base][1][0].T @ start[f.parent][1][0] @ f.axis_of_parent
-            seen, drawn = turned(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _drawn(k, s)
+            seen, drawn = turn_vectors(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _offset_across(k, s)
             if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
                 turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))
                 estimates.setdefault(s.joint, []).append(
@@ -162,7 +163,7 @@ def _turns(model: RobotModel, fixed: Sequence[tuple[TakeEvidence, Sequence[Span]
     return {joint: _mean(each) for joint, each in estimates.items()}
 
 
-def _drawn(k: Kinematics, s: Span) -> Array:
+def _offset_across(k: Kinematics, s: Span) -> Array:
     """What of the way between two joints lies across both axes (3,) [m], in the link's frame, as the model has it."""
     f, following = k.frames[s.joint], k.frames[s.following]
     return across(following.X_PF_p - f.p_BM, f.axis_B, following.axis_of_parent)

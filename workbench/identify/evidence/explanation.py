@@ -67,7 +67,8 @@ class Explanation:
     @property
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """Gravity over torque where it is not as told, with the effects that could be it."""
-        said = (gravity_over_torque(region, self.options, p, fits)
+        weighed = len({repr(e.take.spec.load) for e in self.looked_at}) > 1
+        said = (gravity_over_torque(region, self.options, p, fits, weighed)
                 for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.of_tie))
         return tuple(s for s in said if s is not None)
 
@@ -202,7 +203,7 @@ class Explanation:
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, with their worst event, and parameters that drift within a take."""
-        return (*left_over(evidence, after, floors), *(d.left(evidence) for d in self.drifts))
+        return (*left_over(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
         """All frames were searched: what got no name is no gap, unless it shows."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from workbench.identify.conclusions import Residuals, unexplained
+from workbench.identify.conclusions import Residuals, list_unexplained
 from workbench.identify.problem import TakeEvidence, in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import Dependence
@@ -37,7 +37,7 @@ class _Event(NamedTuple):
 def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels beyond noise, numerics and spread, each with its worst event, the largest first. residuals, floors: over sigma."""
     out = []
-    for u in unexplained(evidence, residuals, floors):
+    for u in list_unexplained(evidence, residuals, floors):
         if not isinstance(u.description, Dependence):
             out.append(u)
             continue

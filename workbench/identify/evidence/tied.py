@@ -55,6 +55,11 @@ class AsTorque:
                 "A known weight hung on the link tells them apart.")
 
 
+def competes(c: Candidate) -> bool:
+    """Whether an effect is of this tie, or can look like one of its effects."""
+    return GRAVITY in (c.effect.tied, c.effect.resembles)
+
+
 def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate) -> AsTorque | None:
     """Of a fit's effect; None where it is not of this tie, or no change of torque resembles it."""
     h, prior = f.hypothesis, Prior.of(f.hypothesis, options)

@@ -17,7 +17,7 @@ from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque
+from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque, competes
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.findings import Alternative, Estimate, Finding
 from workbench.identify.results.tied_names import GravityOverTorque, TiedName
@@ -76,14 +76,14 @@ class TieFits:
 def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[TieFits | None]:
     """Fits of the servo's torques alone, and of each effect of the tie alone, with the servo's torques at their nominal values
     but for their variation between days. None where gravity over torque is nominal and the fit has no effect of the tie. A moved
-    centre of mass and a tilt both turn gravity without changing its size."""
+    centre of mass, a tilt and a turned servo all turn gravity without changing its size."""
     ratio = ratio_of(region, options, f)
-    members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
-    named = any(c.effect.tied == GRAVITY for c in f.hypothesis.effects)
+    members = tuple(c for c in region.candidates if competes(c))
+    named = any(competes(c) for c in f.hypothesis.effects)
     if ratio is None or not members or not (named or ratio.is_apart(options)):
         return None
     told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
-    rest = [(c, x) for c, x in f.hypothesis.sizes() if c.effect.tied != GRAVITY]
+    rest = [(c, x) for c, x in f.hypothesis.sizes() if not competes(c)]
     torque = f
     if len(rest) < len(f.hypothesis.effects):
         alone = Hypothesis(region.numbers, tuple(c for c, _ in rest), np.concatenate([f.hypothesis.z, *(x for _, x in rest)]))
@@ -121,11 +121,15 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
     return [replace(n, sd=min(n.sd, drift.of(n.name))) if n.name in TORQUES else n for n in numbers]
 
 
-def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None
-                        ) -> GravityOverTorque | None:
-    """The tie as it is reported; None where nothing of it has changed. fits: of `fits_of_tie`."""
+def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None,
+                        weighed: bool = False) -> GravityOverTorque | None:
+    """The tie as it is reported; None where nothing of it has changed, or where an effect that could look like one of its effects
+    (`Effect.resembles`) is told from all of them. fits: of `fits_of_tie`; weighed: as the result has it."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or fits is None or not fits.names:
+        return None
+    near = [g.hypothesis.effects[-1] for g in fits.names if fits.behind(g) < options.occam]
+    if not (ratio.is_apart(options) or any(c.effect.tied == GRAVITY for c in (*p.best.hypothesis.effects, *near))):
         return None
     names = []
     for g in fits.names:
@@ -137,6 +141,6 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
                               fits.behind(g)))
     ties = [as_torque(region, options, p.best, c) for c in p.best.hypothesis.effects]
     share = min((t.share for t in ties if t is not None), default=1.0)
-    there = sum(w for f, w in p.weights if any(c.effect.tied == GRAVITY for c in f.hypothesis.effects))
+    there = sum(w for f, w in p.weights if any(competes(c) for c in f.hypothesis.effects))
     return GravityOverTorque(region.joints, ratio.estimate(options), min(1.0, CONCLUSIONS.surest * share * there),
-                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque))
+                             tuple(names), options.drift is not None, options.occam, fits.behind(fits.torque), weighed)

@@ -35,7 +35,7 @@ class Drift:
     rms: float
     chance: float
 
-    def left(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
+    def as_unexplained(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
         """As something that a constant number does not explain."""
         p, joint = self.effect.parameters[self.number], self.effect.joint
         e = next((e for e in evidence if joint is None or joint in e.channels), evidence[0])

@@ -185,7 +185,7 @@ class Search:
         others = [s for s in fit.slopes if not np.isin(s.numbers, here).any()]
         return replace(fit, covariance=covariance, slopes=(*others, *slopes))
 
-    def refined(self, fit: Fit) -> Fit:
+    def refine(self, fit: Fit) -> Fit:
         """The fit with its parameters corrected for finer steps, and its residuals there: the step's error biases parameters by
         several per cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; for a single
         parameter that floating-base takes identify, the minimum over a wide range of values. A quarter of the change is added to

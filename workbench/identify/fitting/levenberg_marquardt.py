@@ -64,7 +64,7 @@ def fit_blocks(
         if stale:
             for b in stale:
                 b.steps = steps_of(b.x, b.low, b.high, stride, magnitudes)
-            points = [[b.moved(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
+            points = [[b.shift(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
             for i, answer in enumerate((yield points)):
                 for b, r in zip(blocks, answer):
                     if b in stale:
@@ -103,7 +103,7 @@ class _Block:
         self.steps = np.zeros(len(self.x))
         self.known = [(self.x, float(self.r @ self.r))]
 
-    def moved(self, i: int) -> Array:
+    def shift(self, i: int) -> Array:
         """Sizes with number i moved for a difference; as they are where there is no such number."""
         return self.x + np.eye(len(self.x))[i] * self.steps[i] if i < len(self.x) else self.x
 
@@ -111,7 +111,7 @@ class _Block:
         """Slope i, from the residuals where parameter i had changed."""
         if i < len(self.x):
             self.J[:, i] = (r - self.r) / self.steps[i]
-            self.differences.append((self.moved(i), r))
+            self.differences.append((self.shift(i), r))
 
     def trials(self) -> tuple[Array, ...]:
         """The next points: a damped step, and on a walk also a short one. Where steps brought no improvement, slopes were noise:

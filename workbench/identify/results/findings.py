@@ -144,7 +144,7 @@ class Finding:
                 **({} if self.family is None else {"family": self.family.to_json()}),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()},
                 "alternatives": [a.to_json() for a in self.alternatives],
-                "fit": self.fit.to_json(), "validation": self.validation.to_json(), **_said("evidence", self.evidence)}
+                "fit": self.fit.to_json(), "validation": self.validation.to_json(), **_optional("evidence", self.evidence)}
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class GapEntry:
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"layer": self.layer, "where": list(self.where), "take": self.take,
-                "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_said("phase", self.phase),
+                "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_optional("phase", self.phase),
                 "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit}
 
 
@@ -286,7 +286,7 @@ def _check_confidence(value: float) -> None:
         raise ValueError(f"confidence: expected a probability, got {value}")
 
 
-def _said(key: str, text: str) -> dict[str, str]:
+def _optional(key: str, text: str) -> dict[str, str]:
     return {key: text} if text else {}
 
 

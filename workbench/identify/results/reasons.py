@@ -40,7 +40,7 @@ class Reason(Statement):
     """Why an effect that was tried is not kept."""
 
     of_chi_squared: ClassVar[bool] = False
-    """Whether it speaks of chi squared, which a report has to explain."""
+    """Whether it mentions chi squared, which a report has to explain."""
 
 
 @dataclass(frozen=True)
@@ -196,8 +196,8 @@ class ParameterDrift(Description):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return (f"{self.parameter} of {naming(self.effect, self.where)} would have to go from {self.first:.3g} to "
-                f"{self.last:.3g} {self.unit} within a take: something that changes looks like it")
+        return (f"{self.parameter} of {naming(self.effect, self.where)} would have to change from {self.first:.3g} to "
+                f"{self.last:.3g} {self.unit} within a take: something that varies with time may be the cause")
 
 
 @dataclass(frozen=True)
@@ -209,5 +209,5 @@ class DownwardPull(Description):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return (f"the {self.effect.replace('_', ' ')} is a pull straight down, with the weight of {1e3 * self.mass:.0f} g that "
-                "does not resist being moved as a load does: something that hangs and swings looks like it")
+        return (f"the {self.effect.replace('_', ' ')} is a vertical pull of {1e3 * self.mass:.0f} g, but without the inertia of "
+                "a load: something that hangs and swings may be the cause")

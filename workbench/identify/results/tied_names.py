@@ -32,7 +32,8 @@ class GravityOverTorque:
     """Gravity over torque of the joints `where`, relative to the robot's files. confidence: probability that one of the effects
     is present, rather than a change of the servo's torques alone; since: whether the files are those of an earlier diagnosis;
     window [nats]: causes this far behind the likeliest are no longer competitive (`EvidenceOptions.occam`); torque_behind [nats]:
-    how much less likely other torques of the servo are than the likeliest cause."""
+    how much less likely other torques of the servo are than the likeliest cause; weighed: whether takes with different known
+    weights tell torque from gravity."""
 
     where: tuple[str, ...]
     ratio: Estimate
@@ -41,6 +42,7 @@ class GravityOverTorque:
     since: bool
     window: float = math.inf
     torque_behind: float = 0.0
+    weighed: bool = False
 
     @property
     def competitive(self) -> tuple[TiedName, ...]:
@@ -62,17 +64,26 @@ class GravityOverTorque:
         """Whether other torques of the servo are a possible cause."""
         return self.torque_behind < self.window
 
+    @property
+    def may_be_several(self) -> bool:
+        """Whether a cause may account for a part alone, and the servo's torques for the rest: each cause is compared as the only
+        one, and nothing but a known weight or an earlier diagnosis tells how strong the servo is."""
+        return self.may_be_torque and not self.since and not self.weighed
+
     def in_words(self) -> str:
         """For a person: the ratio, everything that it may come from, and how to find out."""
         torque = f"all torques of the servo times {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
         causes = [(torque, self.torque_behind)] if self.may_be_torque else []
         causes += [(n.sentence.rstrip("."), n.behind) for n in self.competitive]
         each = [f"{said} ({behind:.0f} nats behind)" if behind >= 1 else said for said, behind in causes]
-        if len(each) == 1:
+        if len(each) == 1 and not self.may_be_several:
             return f"{self.change} Of its possible causes the recordings leave one: {each[0]}."
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
-        return (f"{self.change} Angles alone cannot separate its possible causes: {'; '.join(each)}. To find out, hang a known "
-                f"weight on the link in some takes (`load:`){more}.")
+        causes_said = f"Angles alone cannot separate its possible causes: {'; '.join(each)}."
+        if len(each) == 1:
+            causes_said = (f"Of causes that explain it alone the recordings leave one: {each[0]}; a load, a centre of mass or a "
+                           "spring may account for a part of it, as angles tell nothing but the ratio.")
+        return f"{self.change} {causes_said} To find out, hang a known weight on the link in some takes (`load:`){more}."
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""

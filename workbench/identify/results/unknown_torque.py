@@ -42,7 +42,7 @@ class UnknownTorque:
 
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
-        tables = [t.written() | {"unit": UNITS[t.depends_on], "sd": list(sd)} for t, sd in zip(self.tables, self.sd)]
+        tables = [t.as_dict() | {"unit": UNITS[t.depends_on], "sd": list(sd)} for t, sd in zip(self.tables, self.sd)]
         return {"joint": self.joint, "confidence": float(self.confidence), "rms": float(self.rms), "unit": "N m",
                 "tables": tables, "fit": self.fit.to_json(), "validation": self.validation.to_json(), "evidence": self.evidence}
 

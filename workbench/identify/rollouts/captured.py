@@ -15,7 +15,7 @@ from workbench.effects.apply import apply_to_measurement
 from workbench.identify.problem import TakeEvidence
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.observe import frame_turn
-from workbench.recording.mocap.tracks import SeenJoint, seen_joints, turned_quaternion
+from workbench.recording.mocap.tracks import SeenJoint, seen_joints, turn_quaternion
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -40,7 +40,7 @@ class Rollout(NamedTuple):
 def channels_stream(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]:
     """Channels (N, c) of each rollout as its take would have shown them, in their order, each as soon as it is there."""
     if on_cluster():
-        yield from map(_observed, rollouts, simulate_stream([r.job for r in rollouts], n_jobs))
+        yield from map(_observe, rollouts, simulate_stream([r.job for r in rollouts], n_jobs))
     elif n_jobs == 1 or len(rollouts) == 1:
         yield from (_channels(r, compiled_for(r)) for r in rollouts)
     else:
@@ -50,7 +50,7 @@ def channels_stream(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]
 def seen_channels(rollout: Rollout) -> Array | None:
     """Channels (N, c) from the compiled station; None where it does not know the robot, or cameras did not see the take."""
     compiled = compiled_for(rollout)
-    return None if compiled is None else _compiled(rollout, compiled)
+    return None if compiled is None else _play_compiled(rollout, compiled)
 
 
 def _in_threads(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]:
@@ -60,18 +60,18 @@ def _in_threads(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]:
         started = [None if c is None else threads.submit(_channels, r, c) for r, c in zip(rollouts, covered)]
         try:
             for rollout, channels in zip(rollouts, started):
-                yield _observed(rollout, next(others)) if channels is None else channels.result()
+                yield _observe(rollout, next(others)) if channels is None else channels.result()
         finally:
             threads.shutdown(cancel_futures=True)
 
 
-def _observed(rollout: Rollout, take: Take) -> Array:
-    return rollout.evidence.simulated(take, rollout.model)
+def _observe(rollout: Rollout, take: Take) -> Array:
+    return rollout.evidence.observe(take, rollout.model)
 
 
 def _channels(rollout: Rollout, compiled: CompiledJob | None) -> Array:
-    channels = None if compiled is None else _compiled(rollout, compiled)
-    return _observed(rollout, run_job(rollout.job)) if channels is None else channels
+    channels = None if compiled is None else _play_compiled(rollout, compiled)
+    return _observe(rollout, run_job(rollout.job)) if channels is None else channels
 
 
 def compiled_for(rollout: Rollout) -> CompiledJob | None:
@@ -88,7 +88,7 @@ def compiled_for(rollout: Rollout) -> CompiledJob | None:
     return compiled if followed or not compiled.between else None
 
 
-def _compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
+def _play_compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
     e, model = rollout.evidence, rollout.model
     m = apply_to_measurement(e.take.measurement, model)
     links = [model.rigid_bodies[asset] for asset in m.pivots]
@@ -99,7 +99,7 @@ def _compiled(rollout: Rollout, compiled: CompiledJob) -> Array | None:
         return None
     joints = _looked_at(e, model)
     assets = list(m.pivots)
-    frame = np.array([turned_quaternion(frame_turn(a, m), -m.yaw) if a in m.frames else [1.0, 0, 0, 0] for a in assets])
+    frame = np.array([turn_quaternion(frame_turn(a, m), -m.yaw) if a in m.frames else [1.0, 0, 0, 0] for a in assets])
     turns = np.empty((len(frames), len(joints), 4))
     parents = np.array([-1 if j.parent is None else j.parent for j in joints], dtype=np.int64)
     children = np.array([j.child for j in joints], dtype=np.int64)

@@ -79,7 +79,7 @@ class RolloutEvaluator:
                     continue
                 if not self._until(i, q):
                     answers[key] = np.full_like(self.evidence[i].recorded, np.nan)
-                elif not self._recalled(key, i, q, answers):
+                elif not self._recall(key, i, q, answers):
                     new[key] = (q, i, felt[i])
         # the longest first, so that no core waits at the end
         order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
@@ -107,7 +107,7 @@ class RolloutEvaluator:
         for q in questions:
             keys.append({i: f"log-{self._key(self._felt(q.model, i), i, q)}{self._windows_key(i, q.horizon)}" for i in q.takes})
             new = {i: k for i, k in keys[-1].items()
-                   if k not in answers and k not in seen and not self._recalled(k, i, q, answers)}
+                   if k not in answers and k not in seen and not self._recall(k, i, q, answers)}
             seen |= set(new.values())
             missing.append(new)
         asked = [(q, new) for q, new in zip(questions, missing) if new]
@@ -157,11 +157,11 @@ class RolloutEvaluator:
         """Whether the base is free in any of these takes."""
         return any(self.evidence[i].take.spec.base == "free" for i in takes)
 
-    def observed(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
+    def observe(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
         """All takes as a model left to itself would show them, in another configuration (a finer step), seen like recordings."""
         everywhere = range(len(self.evidence))
         rollouts = simulate_batch([replace(self.job(model, i, config), steadied=None) for i in everywhere], self.n_jobs)
-        return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
+        return [self.evidence[i].take.observe(r, model) for i, r in zip(everywhere, rollouts)]
 
     def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
         """One rollout; each take's own servo changes apply."""
@@ -201,7 +201,7 @@ class RolloutEvaluator:
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
 
-    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
+    def share_closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
                without: Collection[str] = ()) -> float:
         """Share of `before`'s gaps that is closed in `after`, in the channels that had one, so that good channels hide nothing.
         without: joints whose channels do not count."""
@@ -221,7 +221,7 @@ class RolloutEvaluator:
             parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 
-    def expected(self, takes: Sequence[int], use: str) -> float:
+    def expected_cost(self, takes: Sequence[int], use: str) -> float:
         """The sum of squares of `vector` that noise, numerics and contact models make."""
         frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
         return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
@@ -281,7 +281,7 @@ class RolloutEvaluator:
         """How long a question looks at a take [s]."""
         return min(q.until, self.evidence[take].until)
 
-    def _recalled(self, key: str, take: int, q: RolloutRequest, answers: dict[str, Array]) -> bool:
+    def _recall(self, key: str, take: int, q: RolloutRequest, answers: dict[str, Array]) -> bool:
         """Counts a rollout; whether it is known, from this run or from one before: then it is among the answers."""
         self.memory.request(key, self._length(take, self._until(take, q)) / q.step)
         known = self.memory.get(key)

@@ -94,7 +94,7 @@ class RolloutMemory:
             return
         if self._written is None:
             path = self.folder / f"{os.getpid()}-{uuid.uuid4().hex}{SUFFIX}"
-            self._written = self._opened(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
+            self._written = self._open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL)
         content = answer.tobytes()
         rows, columns = answer.shape
         checksum = zlib.crc32(content)
@@ -112,7 +112,7 @@ class RolloutMemory:
 
     def _read(self, path: Path) -> None:
         """Where the records of a file are."""
-        file = self._opened(path, os.O_RDONLY)
+        file = self._open(path, os.O_RDONLY)
         at, end = 0, os.fstat(file).st_size
         while len(header := os.pread(file, _HEADER.size, at)) == _HEADER.size:
             digest, size, rows, columns, checksum = _HEADER.unpack(header)
@@ -122,7 +122,7 @@ class RolloutMemory:
             self._places[digest] = _Place(file, at, size, (rows, columns), checksum)
             at += size * rows * columns
 
-    def _opened(self, path: Path, flags: int) -> int:
+    def _open(self, path: Path, flags: int) -> int:
         file = os.open(path, flags, 0o666)
         weakref.finalize(self, os.close, file)
         return file

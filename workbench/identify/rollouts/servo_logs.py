@@ -40,7 +40,7 @@ def frames(e: TakeEvidence) -> NDArray[np.bool_]:
 
 
 @lru_cache(maxsize=16)
-def _held(config: SimulationConfig) -> SimulationConfig:
+def _log_config(config: SimulationConfig) -> SimulationConfig:
     """The configuration in which logs are rolled out."""
     return replace(config, base="fixed", settle=SETTLE)
 
@@ -50,7 +50,7 @@ def log_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
     """Of each request on some takes the angles (M, c) [rad] at each log's `frames`; None where the compiled station does not know
     the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one structure
     play a log together."""
-    held = {q.step: _held(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
+    held = {q.step: _log_config(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
     played = servo_angles([_jobs([evidence[i] for i in takes], q.model, held[q.step], q.horizon) for q, takes in questions])
     return [None if isinstance(angles, NotCoveredError) else
             [each[:, [q.model.joints.index(j) for j in evidence[i].joints]] for i, each in zip(takes, angles)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.conclusions import ReadOff, Residuals, finding, posterior, rejected, ties, unexplained
+from workbench.identify.conclusions import ReadOff, Residuals, finding, list_rejected, list_unexplained, posterior, ties
 from workbench.identify.estimators.dropped_again import with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.constancy import Drift, drifts
@@ -103,8 +103,8 @@ class Selected:
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
-        drifting = (d.left(evidence) for d in self.drifts)
-        return (*unexplained(evidence, after, floors), *drifting, *downward_pulls(self.fit))
+        drifting = (d.as_unexplained(evidence) for d in self.drifts)
+        return (*list_unexplained(evidence, after, floors), *drifting, *downward_pulls(self.fit))
 
     def is_slight(self) -> bool:
         """Whether all that shows on frames that were searched is too little for a name."""
@@ -113,7 +113,7 @@ class Selected:
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
         """Rivals that lost, and effects that were tried and not accepted."""
         cropped = {i: before[i][:len(e.recorded)] for i, e in enumerate(self.looked_at)}
-        return rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
+        return list_rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
         """The joint posterior of the effects' parameters."""
@@ -132,7 +132,7 @@ def explained_by_selection(problem: Problem) -> Selected:
     chosen = select(Search(evaluator.on(looked_at), problem.nominal), problem.pool, progress, problem.thorough, problem.played)
     search, fit, posteriors = compare_models(chosen.search, chosen, progress)
     progress("numbers at a finer step", None)
-    fit = search.refined(fit) if fit.effects else fit
+    fit = search.refine(fit) if fit.effects else fit
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))

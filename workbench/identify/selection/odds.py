@@ -38,7 +38,7 @@ def misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
     differences are larger than noise alone would make them. joint: one that was judged alone on a fixed base, and so is
     independent of errors elsewhere."""
     if joint is None:
-        return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected(search.fitted, "choose")))
+        return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected_cost(search.fitted, "choose")))
     left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.fixed_base}, "choose", joint)
     return max(1.0, float(left.sum()) / max(1.0, float(expected.sum())))
 

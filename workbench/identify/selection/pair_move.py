@@ -82,7 +82,7 @@ class _Around:
                  if e.size and not search.is_settled(e)]
         return cls(one, fit, moves, [(o, _probes(o)) for o in company])
 
-    def asked(self) -> Iterator[Sizes]:
+    def sizes_around(self) -> Iterator[Sizes]:
         yield self.fit.sizes()
         for e, x, move in self.moves:
             yield from (self.fit.sizes_with(e.key, moved) for moved in x + np.diag(move))
@@ -112,7 +112,7 @@ def _predict_pairs(search: Search, rest: Fit, ones: Sequence[CandidateFit], othe
     takes = search.telling([t.candidate for t in ones], search.fitted)
     around = [_Around.of(t, search.evaluate([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
     questions = [
-        RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.asked()
+        RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.sizes_around()
     ]
     answers = iter([search.evaluator.vector(answer, "fit") for answer in search.evaluator.residuals(questions)])
     best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}

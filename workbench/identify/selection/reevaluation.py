@@ -41,12 +41,12 @@ def _reevaluate(
     rest = search.evaluate(current.sizes_without(t.candidate.key))
     fits = search.side_by_side([fitted_beside(search, rest, [o], takes, SUBSETS.most_steps) for o in rivals])
 
-    def left(fit: Fit) -> dict[str, float]:
+    def remaining(fit: Fit) -> dict[str, float]:
         return {use: search.evaluator.cost({i: fit.residuals[i] for i in takes}, use) for use in t.gain}
 
-    was = left(current)
+    was = remaining(current)
     anew = {o.candidate.key: replace(o, x=fit.sizes_by_key()[o.candidate.key],
-                                     gain={use: t.gain[use] + was[use] - now for use, now in left(fit).items()})
+                                     gain={use: t.gain[use] + was[use] - now for use, now in remaining(fit).items()})
             for o, fit in zip(rivals, fits)}
     known = [anew.get(o.candidate.key, o) for o in r.trials]
     best, taken = max(zip(fits, anew.values()), key=lambda f: f[1].gain["choose"] - FIT.least_gain * len(f[0].x))

@@ -135,7 +135,7 @@ class CandidateEvaluation:
 
     def _calmest(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
         """The take of which responses explain most, and sizes as it wants them; None where none is, or all are (gain)."""
-        beyond = {i: self.power[i] - self.evaluator.expected((i,), "fit") for i in self.takes}
+        beyond = {i: self.power[i] - self.evaluator.expected_cost((i,), "fit") for i in self.takes}
         if gain > SCREENING.calm * sum(beyond.values()):
             return None
         take = take_of(self.evaluator.stretches(self.takes, "fit"))
@@ -210,7 +210,7 @@ class CandidateEvaluation:
             use: self.evaluator.cost(self.base, use, joint) - self.evaluator.cost(answer, use, joint) for use in ("fit", "choose")
         }
         before, after = (self.evaluator.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
-        return CandidateFit(self.group[b], x, off, joint, closed=self.evaluator.closed(self.base, answer, "choose", joint),
+        return CandidateFit(self.group[b], x, off, joint, closed=self.evaluator.share_closed(self.base, answer, "choose", joint),
                      by_channel=before - after)
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> RolloutRequest:

@@ -33,8 +33,8 @@ def _is_calibration(content: Any) -> bool:
 def read_bam_log(path: str | Path) -> Recording:
     """Reads a BAM log: rad, rad/s, volts and degrees Celsius unchanged; the load register becomes `duty`.
 
-    Time is the log's own. The joint has no name in the file and is called by its motor; a take calls it by the model's one joint.
-    InputError where it is not JSON, is cut, lacks an entry's key or contains something other than a number.
+    Time is the log's own. The file does not name the joint: it gets the motor's name, and in a take the name of the model's only
+    joint. InputError if the file is not JSON, is truncated, lacks a key in an entry or contains something other than a number.
     """
     source = str(path)
     content = read_json(path)
@@ -87,7 +87,7 @@ def read_bam_log(path: str | Path) -> Recording:
 
 
 def _supply_problems(said: Any, measured: Array) -> list[str]:
-    """A line where the supply that the header says is not that which the servo measured (N,) [V]."""
+    """A line if the supply stated in the header differs from the one that the servo measured (N,) [V]."""
     seen = measured[np.isfinite(measured) & (measured > 0)]
     if isinstance(said, bool) or not isinstance(said, (int, float)) or not len(seen):
         return []
@@ -115,7 +115,7 @@ def _column(source: str, entries: list[Any], key: str, required: bool) -> Array:
 
 
 def matches(head: bytes) -> bool:
-    """Whether a file begins as JSON does."""
+    """Whether the file begins like JSON."""
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"["))
 
 

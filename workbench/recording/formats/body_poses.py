@@ -30,7 +30,7 @@ def _bodies(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
 
 
 def matches(head: bytes) -> bool:
-    """Whether the header has a time and, of a body at least, a place and a quaternion by these names."""
+    """Whether the header has a time and, for at least one body, a position and a quaternion by these names."""
     if is_binary(head):
         return False
     names = table_header(head).names
@@ -38,7 +38,7 @@ def matches(head: bytes) -> bool:
 
 
 def read_body_poses(path: Path) -> Recording:
-    """Reads such a table; a blank cell is a gap. InputError where a body lacks a column, a column is unknown, or a cell is no
+    """Reads such a table; a blank cell is a gap. InputError if a body lacks a column, a column is unknown, or a cell is not a
     number."""
     source = str(path)
     content, _ = table_bytes(path)
@@ -56,11 +56,11 @@ def read_body_poses(path: Path) -> Recording:
                                  "qy, qz of each body")
     table = read_columns(source, content, header.end, header.lines, len(header.names), wanted=known)
 
-    def stacked(of: dict[str, int], what: tuple[str, ...]) -> np.ndarray:
+    def stack(of: dict[str, int], what: tuple[str, ...]) -> np.ndarray:
         scale = [1e-3 if header.names[of[w]].endswith(_MM) else 1.0 for w in what]
         return np.column_stack([column(table, of[w]) * s for w, s in zip(what, scale)])
 
-    poses = {body: (stacked(of, PLACE), stacked(of, TURN)) for body, of in bodies.items()}
+    poses = {body: (stack(of, PLACE), stack(of, TURN)) for body, of in bodies.items()}
     return recording_of(source, "body_poses", Capture(column(table, header.names.index("time")), poses, {}))
 
 

@@ -1,4 +1,5 @@
-"""C3D files of motion capture, by the package ezc3d: rigid bodies where the file has them, else of markers with a common name."""
+"""C3D files of motion capture, read with the package ezc3d: rigid bodies if the file has them, else bodies formed of markers with
+a common name."""
 
 from __future__ import annotations
 
@@ -40,12 +41,12 @@ def read_c3d(path: Path) -> Recording:
         raise InputError(source, f"a C3D file with POINT:UNITS '{unit[:20]}'; expected m, cm or mm")
     rate = float(_first(about["POINT"], "RATE", 0.0))
     if not rate > 0:
-        raise InputError(source, f"a C3D file with POINT:RATE {rate:g}; expected frames a second")
+        raise InputError(source, f"a C3D file with POINT:RATE {rate:g}; expected a positive number of frames per second")
     scale = METRES[unit.lower()]
     markers = {}
     for i, name in enumerate(about["POINT"].get("LABELS", {}).get("value", [])[:points.shape[1]]):
         p = points[:3, i].T * scale
-        p[(p == 0).all(axis=1)] = np.nan  # as some writers mark what was not seen
+        p[(p == 0).all(axis=1)] = np.nan  # some writers mark unseen markers like this
         markers[str(name)] = p
     bodies = _bodies(source, content, scale)
     count = points.shape[2] or max((len(p) for p, _ in bodies.values()), default=0)

@@ -19,11 +19,11 @@ from workbench.types import Array
 
 METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 1e-3, "millimeters": 1e-3, "millimetres": 1e-3}
 _FEWEST = 3
-"""Markers that a rigid body has at least."""
+"""Least number of markers of a rigid body."""
 _THIN = 0.05
 """A body whose markers lie on a line, to this share of its length, has no rotation about it."""
 _SLOWEST, _FARTHEST = 0.5, 20.0
-"""Frames further apart [s], and places further from each other [m], are not of a small robot in a room."""
+"""Frames this far apart [s], or positions this far from each other [m], cannot come from a small robot in a room."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Capture:
 
 
 def recording_of(source: str, kind: str, capture: Capture) -> Recording:
-    """The recording of a capture in the axes that recordings have (y up); where it has no rigid bodies, those that its markers'
-    names form. InputError where its times do not increase."""
+    """The recording of a capture in the axes of recordings (y up); without rigid bodies, bodies are formed from its markers'
+    names. InputError if its times do not increase."""
     time = capture.time
     if len(time) < 2:
         raise InputError(source, f"{len(time)} frame(s); expected two or more")
@@ -65,8 +65,8 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
 
 
 def _doubts(capture: Capture) -> list[str]:
-    """Contradictions of a small robot in a room: frames too far apart in time, places too far from each other, and quaternions
-    whose scalar comes last."""
+    """Values that cannot come from a small robot in a room: frames too far apart in time, positions too far from each other, and
+    quaternions whose scalar comes last."""
     out = []
     apart = float(np.median(np.diff(capture.time)))
     if apart > _SLOWEST:
@@ -74,11 +74,12 @@ def _doubts(capture: Capture) -> list[str]:
     seen = [p[np.isfinite(p).all(axis=1)] for p in (*(p for p, _ in capture.bodies.values()), *capture.markers.values())]
     places = np.concatenate([p for p in seen if len(p)]) if any(map(len, seen)) else np.zeros((1, 3))
     if (size := float(np.ptp(places, axis=0).max())) > _FARTHEST:
-        out.append(f"places lie up to {size:.4g} m apart: are they in millimetres? (metres are expected, or columns BODY.x_mm)")
+        out.append(f"positions are up to {size:.4g} m apart: are they in millimetres? (expected: metres, or columns BODY.x_mm)")
     first = [q[np.isfinite(q).all(axis=1)][:1] for _, q in capture.bodies.values()]
     turned = [abs(float(q[0, 3])) > 0.97 for q in first if len(q)]
     if turned and all(turned):
-        out.append("every body begins turned half round about z (qw near 0, qz near 1): are the quaternions written x, y, z, w?")
+        out.append("every body starts half a turn about z from neutral (qw near 0, qz near 1): are the quaternions written "
+                   "x, y, z, w?")
     return out
 
 

@@ -1,4 +1,4 @@
-"""Excel workbooks (xlsx): the first sheet that is a recording, read as the table that it would be as CSV."""
+"""Excel workbooks (xlsx): the first sheet that is a recording, read as if it had been saved as CSV."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DAMAGED = (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, IndexEr
 
 
 def matches(head: bytes) -> bool:
-    """Whether it is an archive that begins as Office's do."""
+    """Whether it is an archive that begins like an Office file."""
     return head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head[:200] or b"xl/" in head[:2000])
 
 

@@ -1,4 +1,4 @@
-"""Files that are no recordings of a known format: their columns, the required ones, and how to convert them."""
+"""Files that are not recordings of a known format: their columns, the required ones, and how to convert them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from workbench.recording.formats.registry import known_formats
 from workbench.recording.formats.table_header import table_header
 
 _SHOWN = 6
-"""Columns named in one line."""
+"""Maximum number of columns named in one line."""
 _UNIT = re.compile(r"(?i)[\s_./]*[\[(]\s*(rad|deg|degrees?|radians?|°|s|sec|seconds?|ms|us|ns|rad/s|deg/s|counts?|ticks?|v|a|nm)"
                    r"\s*[\])]$|[\s_]+(rad|deg|degrees|radians|counts|ticks|sec|secs|seconds|s|ms)$")
-"""What stands after a column's name: its unit, in brackets or after a line."""
+"""Matches the unit after a column's name, in brackets or after an underscore."""
 _TIME = re.compile(r"(?i)%?_*(time|timestamp|t|stamp|secs?|seconds?|elapsed)(_?(since|from)_?(start|boot))?(_?stamp)?")
 _GOAL = (r"(?:action|actions|command|commanded|cmd|target|goal|desired|reference|setpoint|set_point|ref|des|input|"
          r"soll)")
@@ -37,14 +37,14 @@ _NAMED = (
 """Names that other tools give to columns of a joint log: the quantity, and the joint."""
 _BARE = {"goal": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_GOAL}[._/ ]?(?:pos|position|angle|q)?"),
          "position": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_SEEN}[._/ ]?(?:pos|position|angle|q)?")}
-"""Of a log of one servo, whose columns name no joint."""
+"""Columns of a log of one servo, which name no joint."""
 _OTHER = re.compile(r"(?i).*(vel|speed|torque|tau|effort|current|load|volt|temp|duty|pwm|error|mode|status|id)\w*")
 """Columns that are neither goal nor position."""
 
 
 @dataclass(frozen=True)
 class _Column:
-    """A column as it is called, without its unit, and that unit."""
+    """A column's name as given, without its unit, and the unit."""
 
     called: str
     plain: str
@@ -52,7 +52,7 @@ class _Column:
 
 
 def refusal(path: Path, head: bytes) -> InputError:
-    """The error for a file of no known format, with its apparent kind and the expected one."""
+    """The error for a file of unknown format, with its apparent kind and the expected one."""
     wanted = ", ".join(f.called for f in known_formats() if f.called)
     if (pointer := lfs_pointer(head)) is not None:
         return InputError(path, pointer)
@@ -94,7 +94,7 @@ def joint_columns(names: Sequence[str]) -> bool:
 
 
 def _hint(columns: list[_Column]) -> str:
-    """How to make a joint log or a motion of the columns; empty where they are neither."""
+    """How to turn the columns into a joint log or a motion; empty if they are neither."""
     time = next((c for c in columns if _TIME.fullmatch(c.plain)), None)
     renames = _pairs(columns) or _bare_pair(columns)
     unit = next((c.unit for c in columns if c.unit.startswith(("rad", "deg", "count", "tick"))), "")
@@ -107,7 +107,7 @@ def _hint(columns: list[_Column]) -> str:
         rest = f" and so on ({len(renames) - 3} more)" if len(renames) > 3 else ""
         return f"; rename {shown}{rest}, in seconds and degrees{into}"
     others = [c for c in columns if c is not time and c.plain and not _OTHER.fullmatch(c.plain)]
-    if time is None or not others or any(_marked(c) == "goal" for c in others):
+    if time is None or not others or any(_kind_of(c) == "goal" for c in others):
         return ""
     joints = ", ".join(_joint_of(c)[:30] for c in others[:3])
     more = " and so on" if len(others) > 3 else ""
@@ -115,7 +115,7 @@ def _hint(columns: list[_Column]) -> str:
             f"{joints}{more}, poses in degrees{into}; as a recording it lacks the goals")
 
 
-def _marked(column: _Column) -> str | None:
+def _kind_of(column: _Column) -> str | None:
     return next((kind for kind, pattern in _NAMED if pattern.fullmatch(column.plain)), None) \
         or next((kind for kind, pattern in _BARE.items() if pattern.fullmatch(column.plain)), None)
 
@@ -132,7 +132,7 @@ def _plain(joint: str) -> str:
 
 
 def _pairs(columns: list[_Column]) -> list[tuple[str, str]]:
-    """New names of the columns of joints of which both goal and position are there."""
+    """New names for the columns of joints that have both a goal and a position."""
     found: dict[str, dict[str, _Column]] = {}
     for column in columns:
         for kind, pattern in _NAMED:
@@ -145,7 +145,7 @@ def _pairs(columns: list[_Column]) -> list[tuple[str, str]]:
 
 
 def _bare_pair(columns: list[_Column]) -> list[tuple[str, str]]:
-    """New names of the one goal and the one position of a log that names no joint."""
+    """New names for the single goal and the single position of a log that names no joint."""
     found = {kind: [c for c in columns if pattern.fullmatch(c.plain)] for kind, pattern in _BARE.items()}
     if any(len(of) != 1 for of in found.values()):
         return []

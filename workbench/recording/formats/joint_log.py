@@ -85,7 +85,7 @@ def _check_names(source: str, names: list[str], line: int) -> None:
 
 
 def _cut_number(content: Bytes, line: int) -> tuple[str, ...]:
-    """A line where the file ends within its last number: no line end, and fewer decimals than in all rows above."""
+    """A line if the file ends within its last number: no line end, and fewer decimals than in all rows above."""
     tail = bytes(content[-20_000:]).decode("utf-8", "replace").split("\n")
     if len(tail) < 12 or not tail[-1].strip():
         return ()

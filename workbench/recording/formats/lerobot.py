@@ -1,9 +1,9 @@
 """LeRobot data sets (huggingface/lerobot, versions 2 and 3): parquet files of goals (`action`) and positions
 (`observation.state`).
 
-Positions are degrees, or -100 to 100 of each joint's calibrated range, which the file does not contain. It does show the sensor's
-count: one of 4096 a turn. Where all steps of a joint are whole multiples of one number, that number is a count, and the
-joint's scale is known.
+Positions are degrees, or -100 to 100 of each joint's calibrated range, which the file does not contain. But the data show the
+sensor's count, 1/4096 of a turn: if all steps of a joint are whole multiples of one number, that number is a count, which gives
+the joint's scale.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ACTION, _STATE, _TIME, _EPISODE = "action", "observation.state", "timestamp", "
 _RATE = 0.05
 """Allowed difference between the rate of time stamps and that in info.json, as a share."""
 _CLEAN = 0.02
-"""Of a count: how far it may be from 360/4096 deg for angles in degrees."""
+"""Allowed difference of a count from 360/4096 deg, as a share, for angles in degrees."""
 
 
 def read_lerobot(path: Path, episode: str | None = None) -> Recording:
@@ -68,7 +68,7 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
 
 
 def _rate_problems(fps: Any, time: Array) -> list[str]:
-    """A line where the frame rate that info.json says is not that of the time stamps (N,) [s]."""
+    """A line if the frame rate in info.json differs from that of the time stamps (N,) [s]."""
     step = float(np.median(np.diff(time)))
     if isinstance(fps, bool) or not isinstance(fps, (int, float)) or fps <= 0 or abs(fps * step - 1) <= _RATE:
         return []
@@ -163,7 +163,7 @@ def _names(path: Path, count: int) -> tuple[str, ...]:
 
 
 def _scales(joints: tuple[str, ...], positions: Array) -> tuple[Array, list[str]]:
-    """Degrees for each unit (n,), by each joint's count, and what there is to say of them."""
+    """Degrees per unit (n,) from each joint's count, and remarks on them."""
     counts = np.array([count_of(np.round(p, 5)) for p in positions.T])
     known = np.isfinite(counts)
     if not known.any():

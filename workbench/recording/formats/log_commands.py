@@ -1,4 +1,4 @@
-"""Commands that a servo log carries itself: a goal in each row."""
+"""Commands contained in a servo log: a goal in each row."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class OrderProblem:
 
 
 def order_problem(time: Array) -> OrderProblem | None:
-    """Problem of times (N,) [any unit] that do not increase; None where they do."""
+    """The problem of times (N,) [any unit] that do not increase; None if they do."""
     bad = np.flatnonzero(out_of_order(time))
     if not len(bad):
         return None
@@ -61,7 +61,7 @@ def _why_out_of_order(time: Array) -> str:
             return "expected increasing times"
         lost = len(repeated) > 0.2 * len(steps) or float(steps[steps > 0].min()) >= 1
         return f"{_LOST} (rounded); {_ALL_DIGITS}" if lost else \
-            f"{len(repeated)} row(s) stand there twice: delete the second of each"
+            f"{len(repeated)} row(s) occur twice: delete the second of each"
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     falls = known[back] - known[back + 1] + usual
     for bits in (16, 32):

@@ -20,17 +20,17 @@ from workbench.recording.formats.motive_header import (
     number,
     parse_header,
 )
-from workbench.recording.formats.numbers import Bytes, column, read_columns, stacked, table_bytes
+from workbench.recording.formats.numbers import Bytes, column, read_columns, stack_columns, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.quaternions import from_euler
 from workbench.recording.recording import Recording
 from workbench.types import Array
 
 _BODIES = ("Rigid Body", "Bone")
-_LARGEST = 1e15  # a frame number that a float holds to the last digit
-_LEAP = 100_000  # frames at least: a quarter of an hour at 120 Hz, and a hundred times what the file holds
-_FEW = 10  # rows that tell no rate
-_DISAGREE = 0.01  # of header and Time column, which is rounded to a millisecond
+_LARGEST = 1e15  # the largest frame number that a float represents exactly
+_LEAP = 100_000  # least leap in frames: a quarter of an hour at 120 Hz, and a hundred times the frames in the file
+_FEW = 10  # too few rows to determine the rate
+_DISAGREE = 0.01  # allowed difference between the header and the Time column, which is rounded to a millisecond
 
 
 def read_motive(path: str | Path) -> Recording:
@@ -55,11 +55,11 @@ def read_motive(path: str | Path) -> Recording:
     raw = {a.name for a in header.assets if a.kind == "Marker"}
     for asset in header.assets:
         if asset.kind in _BODIES and (asset.rotation or asset.position):
-            bodies[_unused(asset.name, bodies)] = _track(source, header, asset, table, scale)
+            bodies[_make_unique(asset.name, bodies)] = _track(source, header, asset, table, scale)
         elif asset.position:
-            namesake = asset.kind != "Marker" and asset.name in raw  # a solved marker makes way for the raw one
-            name = _unused(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
-            markers[name] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
+            namesake = asset.kind != "Marker" and asset.name in raw  # the raw marker replaces the solved one
+            name = _make_unique(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
+            markers[name] = stack_columns(table, _in_order(asset.position, "XYZ")).T * scale
     names = [a.name for a in header.assets if a.kind in _BODIES and (a.rotation or a.position)]
     for name in dict.fromkeys(n for n in names if names.count(n) > 1):
         problems.append(f"{names.count(name)} rigid bodies are called '{name}': they cannot be told apart; rename them in "
@@ -100,11 +100,11 @@ def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, sca
     if not asset.rotation:
         quat = np.full((count, 4), np.nan)
     elif "W" in asset.rotation:
-        quat = stacked(table, _in_order(asset.rotation, "WXYZ")).T
+        quat = stack_columns(table, _in_order(asset.rotation, "WXYZ")).T
     else:
-        angles = np.deg2rad(stacked(table, _in_order(asset.rotation, "XYZ")))
+        angles = np.deg2rad(stack_columns(table, _in_order(asset.rotation, "XYZ")))
         quat = from_euler(dict(zip("XYZ", angles)), euler_order(source, header))
-    p = stacked(table, _in_order(asset.position, "XYZ")) if asset.position else np.full((3, count), np.nan)
+    p = stack_columns(table, _in_order(asset.position, "XYZ")) if asset.position else np.full((3, count), np.nan)
     if scale != 1:
         p *= scale
     error = None if asset.error is None else column(table, asset.error) * scale
@@ -112,7 +112,7 @@ def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, sca
 
 
 def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[str]) -> NDArray[np.int64]:
-    """Frame numbers; a leap of hours is reported, and taken as one frame."""
+    """Frame numbers; a leap of hours is reported and counted as one frame."""
     frames = column(table, 0)
     bad = ~np.isfinite(frames) | (np.abs(frames) > _LARGEST) | (frames != np.round(frames))
     bad[1:] |= ~(np.diff(frames) > 0)
@@ -133,7 +133,7 @@ def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[s
 
 def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], rate: float,
               problems: list[str]) -> tuple[NDArray[np.int64], float]:
-    """Frames and rate that agree with the Time column, which was written frame by frame, where the header does not."""
+    """Frames and rate, corrected by the Time column, which is written frame by frame, if the header disagrees with it."""
     time = column(table, 1) if header.columns > 1 else np.zeros(0)
     good = np.isfinite(time)
     if good.sum() < _FEW or header.timecode == 1:
@@ -176,14 +176,14 @@ def _missing(source: str, header: MotiveHeader, mapped: Bytes, frames: NDArray[n
         problems.append(f"frames missing: {lost} in {len(holes)} hole(s), the first after frame {frames[holes[0]]}")
     announced = number(source, header, "Total Exported Frames")
     if announced is not None and announced != len(frames):
-        if len(frames) < announced and mapped[-1:] != b"\n":  # a cut inside the last cell leaves a row that looks whole
+        if len(frames) < announced and mapped[-1:] != b"\n":  # truncated inside the last cell, whose row looks complete
             line = header.lines + len(frames)
             raise InputError(source, f"line {line}: the file is cut, at {len(frames)} of {announced:.0f} frames and no line end")
         problems.append(f"the header announces {announced:.0f} frames, the file holds {len(frames)}")
     return problems
 
 
-def _unused(name: str, taken: Collection[str]) -> str:
+def _make_unique(name: str, taken: Collection[str]) -> str:
     """The name, numbered where two assets share it."""
     out, n = name, 2
     while out in taken:

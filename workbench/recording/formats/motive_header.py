@@ -57,7 +57,7 @@ def looks_like_motive(head: bytes) -> bool:
 def parse_header(source: str, content: memoryview) -> MotiveHeader:
     """Reads the rows up to the one that starts with `Frame`, wherever that is; InputError if there is none.
 
-    Columns are identified by (type, name, kind, axis), never by their number: versions differ in labels, in a Parent row, in a
+    Columns are identified by (type, name, kind, axis), never by their number, as versions differ in labels, a Parent row and a
     TimeCode column, and spreadsheets pad rows with empty cells.
     """
     rows: list[list[str]] = []
@@ -76,7 +76,7 @@ def _next_line(content: memoryview, start: int) -> tuple[bytes | None, int]:
     if start >= len(content):
         return None, start
     size = 1 << 16
-    while True:  # header rows of many assets are long
+    while True:  # header rows are long if there are many assets
         chunk = bytes(content[start:start + size])
         end = chunk.find(b"\n")
         if end >= 0:

@@ -20,10 +20,10 @@ _DIGITS = 6  # as Motive writes
 
 def write_motive(path: str | Path, bodies: Mapping[str, BodyTrack], rate: float, *, units: str = "Meters", take_name: str = "",
                  first_frame: int = 0, metadata: Mapping[str, str] | None = None) -> Path:
-    """Writes rigid bodies (paths in the capture's axes, metres, quaternions wxyz) whole or not at all; NaN becomes a blank cell.
+    """Writes rigid bodies (paths in the capture's axes, metres, quaternions wxyz) atomically; NaN becomes a blank cell.
 
-    rate [Hz], also that of the header. units: "Meters", "Centimeters" or "Millimeters". metadata: of another file, for what
-    it says of day and coordinates.
+    rate [Hz], also that of the header. units: "Meters", "Centimeters" or "Millimeters". metadata: of another file, from which
+    date and coordinates are taken.
     """
     if units not in _UNITS:
         raise ValueError(f"units: expected one of {', '.join(_UNITS)}, got {units!r}")

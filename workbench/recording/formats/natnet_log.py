@@ -1,4 +1,5 @@
-"""Pose logs that clients of NatNet write: poses without bodies' names, header or frame numbers; told apart, and refused."""
+"""Pose logs written by NatNet clients: poses without bodies' names, header or frame numbers; recognised in order to be
+refused."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from workbench.recording.recording import Recording
 _TURN = r"(rot(ation)?|quat(ernion)?|q|r|o(rientation)?)(_rs)?"
 _POSE = (r"(.*[ ./_])?((pos(ition)?|t|p|trans(lation)?)(_rs_r)?)?[ _./]?x", rf"(.*[ ./_])?{_TURN}[ _./]?x",
          rf"(.*[ ./_])?{_TURN}[ _./]?w")
-"""Of a place and a quaternion, whatever stands before it (a topic, a body), as NatNet, ROS, TUM and EuRoC call them."""
+"""Columns of a position and a quaternion as NatNet, ROS, TUM and EuRoC name them, with any prefix (a topic, a body)."""
 
 
 def _cells(head: bytes) -> list[str]:
@@ -34,7 +35,8 @@ def matches(head: bytes) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """InputError with its apparent content and the missing data: the file does not name the robot's body, or the time."""
+    """Raises InputError with the apparent content and the missing data: the file does not name the robot's body, or has no
+    times."""
     from workbench.files.tables import plain_head
 
     cells = _cells(plain_head(path))

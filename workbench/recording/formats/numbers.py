@@ -1,4 +1,4 @@
-"""Bodies of CSV files as columns, by the fastest reader there is, and where they are broken if they are."""
+"""Reads the data rows of CSV files as columns with the fastest available reader, and locates errors in them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from workbench.types import Array
 
 Bytes = bytes | mmap.mmap
 _BLOCK = 1 << 22
-"""Bytes that are read at once; less is sooner read by one thread than given to several."""
+"""Bytes read at once; a smaller file is read faster by one thread than by several."""
 _CLOCK = re.compile(r"\d{4}-\d\d-\d\d|\d\d?:\d\d")
 """How dates and times of day are written."""
 _BLANK = ["", " ", "NaN", "nan", "NA", "N/A", "#N/A", "null", "NULL", "None"]
@@ -42,7 +42,7 @@ def map_file(path: str | Path) -> mmap.mmap:
 
 
 def table_bytes(path: str | Path) -> tuple[Bytes, str]:
-    """The bytes of a table made plain (`plain_table`), mapped where they are plain already, and how it was written if not."""
+    """The bytes of a table made plain (`plain_table`), mapped if the file is plain already, and how it was written if not."""
     mapped = map_file(path)
     written = plain_table(mapped[:HEAD])[1]
     if not written:
@@ -86,7 +86,7 @@ def read_columns(source: str, content: Bytes, offset: int, lines: int, width: in
 
 def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: int, text: Collection[int]
                   ) -> InputError | None:
-    """The first row that is not as wide as the header or not of numbers; looked for only once the fast reader has failed."""
+    """The first row that is not as wide as the header or not numeric; searched for only after the fast reader has failed."""
     n = lines
     while offset < len(content):
         end = content.find(b"\n", offset)
@@ -117,7 +117,7 @@ def _why_width(row: list[str], width: int, last: bool) -> str:
 
 
 def _why_word(row: list[str], cell: str) -> str:
-    """The likely cause of a cell that is no number, and the remedy; empty where nothing tells."""
+    """The likely cause of a cell that is not a number, and the remedy; empty if unknown."""
     if len(row) > 1 and all(re.match(r"[\[(]?[A-Za-z_%°]", c) for c in row):
         units = all(len(c.strip("[]()")) <= 6 for c in row)
         return " (a row of units: delete the line)" if units else " (a second header: two logs in one file? Delete it or split)"
@@ -144,7 +144,7 @@ def strings(table: pa.Table, index: int) -> list[str]:
     return [v or "" for v in table.column(str(index)).to_pylist()]
 
 
-def stacked(table: pa.Table, columns: Sequence[int]) -> Array:
+def stack_columns(table: pa.Table, columns: Sequence[int]) -> Array:
     """Columns as rows of one array (len(columns), N), filled chunk by chunk without a second copy."""
     out = np.empty((len(columns), table.num_rows))
     for row, index in zip(out, columns):

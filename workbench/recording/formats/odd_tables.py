@@ -1,4 +1,4 @@
-"""Tables that are not written as tables are: why they are not read, and how to mend them."""
+"""Tables in an unusual layout: why they cannot be read, and how to repair them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary, split_row
 
 _MOST = 60
-"""Lines among which a header is looked for."""
+"""Number of lines that are searched for a header."""
 _SEPARATORS = ((",", "commas"), (";", "';'"), ("\t", "tabs"), ("|", "'|'"), (None, "blanks"))
 
 
 def odd_table(head: bytes) -> str | None:
-    """Cause and remedy for a text that begins with `head` and is no table as it stands; None where nothing tells."""
+    """Cause and remedy for a text that begins with `head` and cannot be read as a table; None if the cause is unknown."""
     if is_binary(head):
         return _odd_bytes(head)
     text = head.decode("utf-8-sig", "replace")
@@ -26,18 +26,18 @@ def odd_table(head: bytes) -> str | None:
     if long_table(split_row(lines[0])):
         return ("a table with one number in each row: give each channel a column, with pandas' pivot(index='time', columns=..., "
                 "values='value')")
-    return _header_below(text.splitlines()) or _transposed(lines)
+    return _header_below(text.splitlines()) or _find_transposed(lines)
 
 
 def long_table(names: Sequence[str]) -> bool:
-    """Whether a header is that of a table with one number in each row: time, the channel's name, its value."""
+    """Whether a header belongs to a table with one number in each row: time, the channel's name, its value."""
     lower = {name.lower() for name in names}
     kinds = {"variable", "name", "channel", "signal", "joint", "topic", "key"}
     return 3 <= len(lower) <= 4 and "value" in lower and bool(lower & kinds)
 
 
 def _odd_bytes(head: bytes) -> str | None:
-    """Of a file with NUL bytes that is text all the same."""
+    """Cause and remedy for a text file that contains NUL bytes."""
     quarter = max(len(head) // 4, 1)
     ends = {k: head[k:4 * quarter:4].count(0) / quarter for k in range(4)}
     if sum(share > 0.9 for share in ends.values()) == 3:
@@ -55,7 +55,7 @@ def _odd_bytes(head: bytes) -> str | None:
 
 
 def _header_below(lines: list[str]) -> str | None:
-    """Of a table whose header stands below other lines, or whose cells another character separates."""
+    """Cause and remedy for a table whose header is below other lines, or whose cells are separated by another character."""
     for n, line in enumerate(lines[:_MOST]):
         for mark, name in _SEPARATORS:
             cells = split_row(line) if mark == "," else [c.strip().strip('"') for c in line.strip(" |").split(mark)]
@@ -73,7 +73,7 @@ def _names_a_log(cells: list[str]) -> bool:
         any(re.search(r"goal|position|action|command|target|\.q[wxyz]$", c) for c in lower)
 
 
-def _transposed(lines: list[str]) -> str | None:
+def _find_transposed(lines: list[str]) -> str | None:
     rows = [split_row(line) for line in lines[:4]]
     names = sum(number_of(row[0]) is None for row in rows)
     numbers = all(len(row) > 8 and all(number_of(c) is not None for c in row[1:] if c) for row in rows)

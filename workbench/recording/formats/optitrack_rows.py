@@ -27,8 +27,8 @@ def matches(head: bytes) -> bool:
 
 
 def read_optitrack_rows(path: Path) -> Recording:
-    """Reads bodies by the names of their `rigidbody` rows; a body that a frame lacks is a gap. InputError names the line of a row
-    that is cut."""
+    """Reads bodies by the names of their `rigidbody` rows; a body missing from a frame is a gap. InputError names the line of a
+    truncated row."""
     source = str(path)
     names: dict[int, str] = {}
     times, frames = list[float](), list[dict[int, list[float]]]()

@@ -1,4 +1,4 @@
-"""Any recording, told apart by its content."""
+"""Reads any recording; its format is recognised by its content."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from workbench.files.tables import plain_head
 from workbench.recording.formats.foreign import refusal
 from workbench.recording.formats.registry import RecordingFormat, format_of, format_of_folder, known_formats
 from workbench.recording.recording import Recording
-from workbench.recording.servo_log.plausibility import checked
+from workbench.recording.servo_log.plausibility import check_log
 
 KEPT = 64 << 20
-"""Recordings that are kept, as a verb checks a session before it uses it [bytes]; a minute of 14 bodies is 3 MB."""
+"""Size of the cache of recordings [bytes], as a verb checks a session before it uses it; a minute of 14 bodies is 3 MB."""
 _read_before: OrderedDict[tuple[str, str | None, bytes], Recording] = OrderedDict()
 
 
@@ -31,12 +31,12 @@ def recording_of_take(path: Path, take: str) -> Path:
     except InputError as e:
         if file.is_dir():
             raise InputError(None, f"{e.problem}: {file}") from None
-        # what is damaged is told when it is read
+        # a damaged file is reported when it is read
     if part is not None and part not in known:
-        raise InputError(None, f"no programme '{part}' in {file}; expected one of {_listed(known) or 'a file of several'}")
+        raise InputError(None, f"no programme '{part}' in {file}; expected one of {_list(known) or 'a file of several'}")
     if part is None and len(known) > 1:
         if take not in known:
-            raise InputError(None, f"{file} holds {len(known)} programmes ({_listed(known)}); expected FILE#PROGRAMME, or a take "
+            raise InputError(None, f"{file} holds {len(known)} programmes ({_list(known)}); expected FILE#PROGRAMME, or a take "
                                    "called like one")
         return file.with_name(f"{file.name}#{take}")
     return path
@@ -51,8 +51,8 @@ def split_part(path: Path) -> tuple[Path, str | None]:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Reads a recording of any known format, recognised by its content; its joints' channels checked, and repaired where that is
-    certain.
+    """Reads a recording of any known format, recognised by its content; its joints' channels are checked, and repaired if the
+    repair is certain.
 
     One recording of a file of several is called FILE#PART. InputError where the content is of no format or is damaged. Reading an
     unchanged file again returns the same object, as long as it is among the last `KEPT` bytes that were read.
@@ -64,14 +64,14 @@ def read_recording(path: str | Path) -> Recording:
     if found is None:
         found = _read(path, part, known)
     if key[2]:
-        _read_before[key] = found  # the last to be dropped
+        _read_before[key] = found  # most recently used: dropped last
     while len(_read_before) > 1 and sum(map(_size, _read_before.values())) > KEPT:
         _read_before.popitem(last=False)
     return found
 
 
 def _digest(path: Path) -> bytes:
-    """Of a file's content; empty for a folder."""
+    """Digest of a file's content; empty for a folder."""
     if path.is_dir():
         return b""
     with path.open("rb") as file:
@@ -79,19 +79,19 @@ def _digest(path: Path) -> bytes:
 
 
 def _size(r: Recording) -> int:
-    """Bytes of its numbers."""
+    """Size of a recording's arrays [bytes]."""
     bodies = sum(b.p.nbytes + b.quat.nbytes for b in r.rigid_bodies.values())
     return bodies + sum(a.nbytes for a in (*r.channels.values(), *r.markers.values()))
 
 
 def _read(path: Path, part: str | None, known: RecordingFormat) -> Recording:
     if part is None:
-        return checked(known.read(path))
+        return check_log(known.read(path))
     names = known.parts(path)
     if known.read_part is None or part not in names:
-        raise InputError(path, f"no programme '{part}'; expected one of {_listed(names)}" if names
+        raise InputError(path, f"no programme '{part}'; expected one of {_list(names)}" if names
                          else f"'#{part}' is not allowed: the file holds a single recording")
-    return checked(known.read_part(path, part))
+    return check_log(known.read_part(path, part))
 
 
 def _format(path: Path) -> RecordingFormat:
@@ -110,5 +110,5 @@ def _format(path: Path) -> RecordingFormat:
     return found
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _list(names: tuple[str, ...]) -> str:
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

@@ -1,4 +1,4 @@
-"""The formats in which recordings come: those of this folder, one file each, and those of other packages."""
+"""The formats of recordings: those in this folder, one file each, and those of other packages."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ ENTRY_POINT_GROUP = "workbench.formats"
 class RecordingFormat:
     """One format. A package adds its own as an entry point of the group `workbench.formats` that names such an object.
 
-    name: of recordings' `kind`. called: by which messages call it, empty where it is only refused. matches: whether a file that
-    begins with these bytes (64 kB, or all; a text made plain as by `plain_table`) is of the format. read: the whole of it,
-    InputError where it is damaged. marks: file by which a folder is known as a recording of the format. parts: names of the
-    several recordings that a file or folder holds, empty where it is one; read_part: one of them. Formats are asked in the order
-    of `priority`, then of their names.
+    name: of recordings' `kind`. called: its name in messages, empty if it is only refused. matches: whether a file that begins
+    with these bytes (64 kB, or all; a text made plain as by `plain_table`) is of the format. read: the whole of it, InputError
+    where it is damaged. marks: the file by which a folder is recognised as a recording of the format. parts: names of the
+    recordings in a file or folder, empty if it holds just one; read_part: reads one of them. Formats are tried in order of
+    `priority`, then of name.
     """
 
     name: str
@@ -36,7 +36,7 @@ class RecordingFormat:
 
 @cache
 def known_formats() -> tuple[RecordingFormat, ...]:
-    """All formats, in the order in which they are asked; an installed plug-in may not take the name of another format."""
+    """All formats, in the order in which they are tried; a plug-in may not take the name of another format."""
     import workbench.recording.formats as room
 
     own = {known.name: known for known in of_folder(room, "FORMAT", RecordingFormat)}
@@ -45,10 +45,10 @@ def known_formats() -> tuple[RecordingFormat, ...]:
 
 
 def format_of(head: bytes) -> RecordingFormat | None:
-    """The format of a file that begins with `head` (made plain); None where no format knows it."""
+    """The format of a file that begins with `head` (made plain); None if no format matches."""
     return next((f for f in known_formats() if f.matches(head)), None)
 
 
 def format_of_folder(folder: Path) -> RecordingFormat | None:
-    """The format of which a folder is a recording, if any."""
+    """The format in which a folder is a recording, if any."""
     return next((f for f in known_formats() if f.marks and (folder / f.marks).is_file()), None)

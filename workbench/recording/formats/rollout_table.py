@@ -1,4 +1,4 @@
-"""A take as one table: what `simulate` writes, and any tool that reads CSV can plot."""
+"""A take as one CSV table, as `simulate` writes it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEADER = "# workbench rollout"
 _UNITS = ("# s; deg; deg/s; N m; base and contact in the world's axes, x forward, y left, z up: m, quaternion wxyz, N; "
           "time 0 is the first command of a simulation, the first frame of a recording")
 _POSE = ("base.x", "base.y", "base.z", "base.qw", "base.qx", "base.qy", "base.qz")
-_DECIMALS = 7  # of degrees, metres, seconds: far below any noise, and the table stays short
+_DECIMALS = 7  # decimals of degrees, metres and seconds: far below any noise, and the table stays short
 
 
 def is_rollout(first_line: str) -> bool:
@@ -35,7 +35,7 @@ def save_rollout(take: Take, path: str | Path) -> Path:
     """Writes a take as CSV under three comment lines: format, description (JSON, commands included), units.
 
     Columns: time, position.J, velocity.J, torque.J of each joint J, base.x … base.qz, contact.FOOT.x … (line 3: units);
-    quantities that the take lacks are left out, a gap is a blank cell. Rigid bodies are not written.
+    quantities that the take lacks are omitted; a gap is a blank cell. Rigid bodies are not written.
     """
     columns: dict[str, Array] = {"time": take.time}
     for kind, values, unit in (("position", take.q, _DEG), ("velocity", take.v, _DEG), ("torque", take.torque, 1.0)):
@@ -82,7 +82,7 @@ def load_rollout(path: str | Path) -> Take:
     if not len(time) or out_of_order(time).any():
         raise InputError(path, "column 'time': expected increasing numbers")
 
-    def stacked(names: list[str], unit: float = 1.0) -> Array | None:
+    def stack(names: list[str], unit: float = 1.0) -> Array | None:
         if not any(n in columns for n in names):
             return None
         missing = [n for n in names if n not in columns]
@@ -90,14 +90,14 @@ def load_rollout(path: str | Path) -> Take:
             raise InputError(path, f"line 4: column '{missing[0]}' is missing")
         return np.column_stack([columns[n] for n in names]) * unit
 
-    pose = stacked(list(_POSE))
-    q = stacked([f"position.{j}" for j in joints], _DEG)
+    pose = stack(list(_POSE))
+    q = stack([f"position.{j}" for j in joints], _DEG)
     assert q is not None
-    contact = {f: stacked([f"contact.{f}.{a}" for a in "xyz"]) for f in feet}
+    contact = {f: stack([f"contact.{f}.{a}" for a in "xyz"]) for f in feet}
     return Take(
         name=str(name), source=str(source), base=str(base), time=time, joints=joints, q=q, starts_at=start,
-        zeroed=bool(zeroed), v=stacked([f"velocity.{j}" for j in joints], _DEG),
-        torque=stacked([f"torque.{j}" for j in joints]),
+        zeroed=bool(zeroed), v=stack([f"velocity.{j}" for j in joints], _DEG),
+        torque=stack([f"torque.{j}" for j in joints]),
         p_WB=None if pose is None else pose[:, :3], quat_WB=None if pose is None else pose[:, 3:],
         contact={f: c for f, c in contact.items() if c is not None}, commands=commands, problems=problems)
 

@@ -23,7 +23,8 @@ _TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.I
 _SECONDS = re.compile(r"(?:.*[./])?(?:stamp|time)[./]secs?", re.IGNORECASE)
 _NANO = re.compile(r"(?:.*[./])?(?:stamp|time)[./](?:nano_?sec|nsec)s?", re.IGNORECASE)
 _EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
-"""Times since 1970 are 1.7e18 ns, 1.7e15 us, 1.7e12 ms or 1.7e9 s: from how many on, and seconds for each."""
+"""Units of times since 1970, which are 1.7e18 ns, 1.7e15 us, 1.7e12 ms or 1.7e9 s: the least number for each unit, and the
+unit in seconds."""
 _GOAL = r"(reference|desired|setpoint|goal|command)"
 _SEEN = r"(feedback|actual|measured|state|output)"
 _INDEXED = r"[./]positions?[._]?\[?(\d+)\]?"
@@ -69,8 +70,8 @@ def matches(head: bytes) -> bool:
 
 
 def read_ros_csv(path: Path) -> Recording:
-    """Reads goals and positions [rad] of the joints that have both; nanoseconds become seconds. Rows in which another topic alone
-    has a value are left out. InputError where a cell is no number or time does not increase."""
+    """Reads goals and positions [rad] of the joints that have both; nanoseconds become seconds. Rows in which only another topic
+    has a value are skipped. InputError if a cell is not a number or time does not increase."""
     source = str(path)
     content, _ = table_bytes(path)
     end = content.find(b"\n")
@@ -102,7 +103,7 @@ def read_ros_csv(path: Path) -> Recording:
 
 
 def _name(table: pa.Table, names: dict[str, int], key: str) -> str:
-    """A joint's name by its key: that itself, or for an index the entry in the column of names, or joint_1 and so on."""
+    """A joint's name: the key itself or, if it is an index, the entry in the column of names, or joint_1 and so on."""
     if not key.isdecimal():
         return key
     if key in names:

@@ -1,4 +1,5 @@
-"""Bags of ROS 1 and ROS 2 (rosbag, SQLite, MCAP), by the package rosbags: joints' goals and positions, else poses of bodies."""
+"""Bags of ROS 1 and ROS 2 (rosbag, SQLite, MCAP), read with the package rosbags: goals and positions of joints, else poses of
+bodies."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from workbench.recording.recording import Recording
 from workbench.types import Array
 
 Samples = dict[str, list[tuple[float, float]]]
-"""By joint, times [s] and angles [rad]."""
+"""Times [s] and angles [rad] by joint."""
 Pose = tuple[float, list[float], list[float]]
 _GOAL_WORDS = ("command", "cmd", "goal", "target", "desired", "reference", "setpoint")
 _BEGINNINGS = (b"\x89MCAP0\r\n", b"#ROSBAG V", b"SQLite format 3\0")
@@ -63,7 +64,7 @@ def read_rosbag(path: Path) -> Recording:
 
 
 class _Found:
-    """Content of a bag, gathered message by message."""
+    """Content of a bag, collected message by message."""
 
     def __init__(self) -> None:
         self.topics: dict[str, str] = {}
@@ -123,7 +124,7 @@ def _place(found: _Found, body: str, time: float, p: Any, q: Any) -> None:
 
 
 def _pose(found: _Found, topic: str, time: float, message: Any) -> None:
-    pose = getattr(message.pose, "pose", message.pose)  # with covariance, of odometry
+    pose = getattr(message.pose, "pose", message.pose)  # odometry nests the pose in one with covariance
     _place(found, topic.strip("/").removesuffix("/pose").rpartition("/")[2], time, pose.position, pose.orientation)
 
 
@@ -143,7 +144,7 @@ _TAKES = {"JointState": _joint_state, "JointTrajectoryControllerState": _control
 """Reader of each type of message."""
 
 
-def _sorted(samples: list[tuple[float, float]]) -> tuple[Array, Array]:
+def _sort(samples: list[tuple[float, float]]) -> tuple[Array, Array]:
     table = np.array(samples)
     times, rows = np.unique(table[:, 0], return_index=True)
     return times, table[rows, 1]
@@ -151,11 +152,11 @@ def _sorted(samples: list[tuple[float, float]]) -> tuple[Array, Array]:
 
 def _joint_recording(source: str, found: _Found, joints: list[str]) -> Recording:
     """On the clock of the positions; a goal holds until the next."""
-    clocks = {j: _sorted(found.positions[j]) for j in joints}
+    clocks = {j: _sort(found.positions[j]) for j in joints}
     time = clocks[joints[0]][0]
     channels: dict[str, Array] = {}
     for joint in joints:
-        at, goals = _sorted(found.goals[joint])
+        at, goals = _sort(found.goals[joint])
         before = np.searchsorted(at, time, side="right") - 1
         channels[f"goal.{joint}"] = np.where(before >= 0, goals[np.maximum(before, 0)], np.nan)
         seen, positions = clocks[joint]
@@ -173,7 +174,7 @@ def _joint_recording(source: str, found: _Found, joints: list[str]) -> Recording
 
 
 def _pose_recording(source: str, found: _Found) -> Recording:
-    """Bodies on the clock of the one seen most often; where another was not seen then, it has a gap."""
+    """Bodies on the clock of the one seen most often; frames in which another body was not seen are gaps."""
     stamps = {body: np.array([t for t, _, _ in poses]) for body, poses in found.poses.items()}
     time = np.unique(max(stamps.values(), key=len))
     near = 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -34,7 +34,7 @@ _MORE = {"v_meas": "velocity", "tau_abs": "torque_magnitude"}
 
 
 def sage_programmes(path: str | Path) -> tuple[str, ...]:
-    """Names of the programmes in an npz, without reading them; none where it is no such file."""
+    """Names of the programmes in an npz, without reading them; empty if it is not such a file."""
     try:
         with zipfile.ZipFile(regular_file(path)) as content:
             names = [n.removesuffix(".npy") for n in content.namelist() if n.endswith(".npy")]
@@ -46,8 +46,9 @@ def sage_programmes(path: str | Path) -> tuple[str, ...]:
 def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
     """Reads one programme of an npz with keys `<programme>/<field>` (seconds, radians).
 
-    Without `programme` an npz of several gives all of them one after the other, each on its own clock, which can be inspected but
-    makes no take. Channels goal, position, velocity and torque_magnitude (from the current register, without sign) of each joint.
+    Without `programme`, an npz of several gives all of them one after the other, each on its own clock; that can be inspected but
+    not used as a take. Channels goal, position, velocity and torque_magnitude (from the current register, without sign) of each
+    joint.
     """
     source = str(path)
     try:
@@ -69,7 +70,7 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
 
 
 def _check_size(path: str | Path) -> None:
-    """InputError where the unpacked content would fill the memory: the archive states how large each array is."""
+    """InputError if the unpacked content would fill the memory; the archive states the size of each array."""
     with zipfile.ZipFile(path) as content:
         total = sum(entry.file_size for entry in content.infolist())
     if total > MOST_UNPACKED:

@@ -1,4 +1,4 @@
-"""The line of a table that names its columns, below whatever comments stand above it."""
+"""The line of a table that names its columns, below any comments."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from workbench.files.tables import split_row
 from workbench.recording.formats.numbers import Bytes
 
 _OWN = b"# workbench"
-"""How tables that the workbench writes begin: not comments but their kind."""
+"""First lines of tables that the workbench writes: they state the kind and are not comments."""
 _MOST = 200
-"""Lines of comments that are looked through."""
+"""Maximum number of comment lines before the header."""
 
 
 @dataclass(frozen=True)

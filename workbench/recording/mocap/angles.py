@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording import quaternions as quat
-from workbench.recording.mocap.tracks import Tracks, relative_rotation, seen_joints, turned, turned_quaternion
+from workbench.recording.mocap.tracks import Tracks, relative_rotation, seen_joints, turn_quaternion, turn_vectors
 from workbench.robot import RobotModel
 from workbench.types import Array
 
@@ -32,8 +32,8 @@ def joint_angles(tracks: Tracks, model: RobotModel, yaw: float, base: str) -> An
     q, off, reach = np.full((n, len(joints)), np.nan), np.full((n, len(joints), 3), np.nan), np.zeros((n, len(joints)))
     for c, joint in enumerate(joints):
         relative = relative_rotation(tracks, joint)
-        q[:, c], swing = quat.swing_twist(relative, turned(joint.axis, yaw))
-        off[:, c] = turned(swing, -yaw)
+        q[:, c], swing = quat.swing_twist(relative, turn_vectors(joint.axis, yaw))
+        off[:, c] = turn_vectors(swing, -yaw)
         rows = [r for r in (joint.parent, joint.child) if r is not None]
         reach[:, c] = np.sum(tracks.seconds_squared[rows], axis=0)
     return Angles(tuple(j.name for j in joints), q, off, reach, tuple(problems))
@@ -64,4 +64,4 @@ def base_row(tracks: Tracks, model: RobotModel) -> int | None:
 def in_world(tracks: Tracks, yaw: float, origin: Array) -> tuple[Array, Array]:
     """p (A, N, 3) and q (A, N, 4) in the take's world: x along the first heading, its origin under the base's at rest, on the
     capture's floor."""
-    return (turned(tracks.p - np.array([origin[0], origin[1], 0.0]), -yaw), turned_quaternion(tracks.q, -yaw))
+    return (turn_vectors(tracks.p - np.array([origin[0], origin[1], 0.0]), -yaw), turn_quaternion(tracks.q, -yaw))

@@ -1,5 +1,4 @@
-"""Axes and lengths of a capture against the robot's own: changes made by an export's settings that its header does not
-mention."""
+"""Checks the axes and lengths of a capture against the robot: export settings can change them without a word in the header."""
 
 from __future__ import annotations
 
@@ -13,21 +12,24 @@ from workbench.recording.mocap.tracks import Tracks
 from workbench.robot import RobotModel
 from workbench.types import Array
 
-_FIRST = 10  # frames of a body that tell where it was at first
-_LEAST = 4  # bodies that tell
+_FIRST = 10  # frames that give a body's first position
+_LEAST = 4  # least number of bodies
 _NEAR = 0.2
-"""How far a ratio of lengths may be from a power of ten, in its logarithm: pivots lie anywhere on their links."""
+"""Largest difference, in the decimal logarithm, of a ratio of lengths from a power of ten: pivots can be anywhere on their
+links."""
 _SHARE = 0.25
-"""Of the robot's size: how badly the bodies must lie with y up, to ask whether z is; of that, how well they then must."""
+"""Least misfit with y up, as a share of the robot's size, at which z up is tried; that must leave less than twice this share of
+the misfit."""
 
 _ODD = 0.1
-"""Of the robot's size: how badly the bodies must lie, to ask whether they are mirrored or exchanged."""
+"""Least misfit, as a share of the robot's size, at which mirrored or exchanged bodies are considered."""
 _BETTER = 0.4
-"""A mirrored or exchanged arrangement must fit so many times as badly at most."""
+"""Largest misfit of a mirrored or exchanged arrangement, as a share of the original one's."""
 
 
 def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
-    """Tracks in metres with z up in the model's axes, as the robot's links say where the file's header is wrong; told."""
+    """Tracks in metres, with z up, in the model's axes. If the robot's links show that the file's header is wrong, this is
+    corrected and reported."""
     found = _laid_out(tracks, model)
     if found is None:
         return tracks
@@ -50,8 +52,8 @@ def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
 
 
 def layout_yaw(tracks: Tracks, model: RobotModel) -> float | None:
-    """The yaw [rad] of the robot's first heading in the capture's axes that its bodies' first places tell, to some degrees; None
-    where they are too few or lie in a line above each other."""
+    """The yaw [rad] of the robot's first heading in the capture's axes, from its bodies' first positions, to a few degrees; None
+    if the bodies are too few or lie above each other."""
     found = _laid_out(tracks, model)
     if found is None:
         return None
@@ -61,7 +63,7 @@ def layout_yaw(tracks: Tracks, model: RobotModel) -> float | None:
 
 
 def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | None:
-    """A line for first places (A, 3) that fit the links (A, 3) far better mirrored, or with two bodies exchanged."""
+    """A line if first positions (A, 3) fit the links (A, 3) far better when mirrored, or with two bodies exchanged."""
     now = _misfit(places, links)
     mirrored = _misfit(places * np.array([1.0, -1.0, 1.0]), links)
     pairs = {}
@@ -80,8 +82,8 @@ def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | Non
 
 
 def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[tuple[str, ...], Array, Array] | None:
-    """Names of bodies (A), their first places, and their links' centres of mass in the neutral pose, (A, 3) each; None where too
-    few tell."""
+    """Names of bodies (A), their first positions, and their links' centres of mass in the neutral pose, (A, 3) each; None if
+    there are too few."""
     at = _first_places(tracks)
     if len(at) < _LEAST or any(tracks.assets[i] not in model.rigid_bodies for i in at):
         return None
@@ -97,7 +99,7 @@ def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[tuple[str, ...], Array
 
 
 def _turn(a: Array, b: Array) -> float:
-    """Angle about z [rad] that lays centred places a (A, 3) over b best."""
+    """Angle about z [rad] that best aligns centred positions a (A, 3) with b."""
     cosine, sine = float(np.sum(a[:, :2] * b[:, :2])), float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
     return float(np.arctan2(sine, cosine))
 
@@ -117,7 +119,8 @@ def _z_up(v: Array) -> Array:
 
 
 def _power_of_ten(places: Array, links: Array) -> float:
-    """Factor that brings distances between places (A, 3) to those of links (A, 3); 1 unless it is near a power of ten."""
+    """Factor by which distances between positions (A, 3) must be multiplied to match those of links (A, 3); 1 unless it is near a
+    power of ten."""
     pairs = [(np.linalg.norm(places[a] - places[b]), np.linalg.norm(links[a] - links[b]))
              for a, b in combinations(range(len(places)), 2)]
     ratios = [d / nominal for d, nominal in pairs if nominal > 0.02 and d > 0]
@@ -129,7 +132,7 @@ def _power_of_ten(places: Array, links: Array) -> float:
 
 
 def _misfit(places: Array, links: Array) -> float:
-    """RMS distance [m] of places from links (A, 3), laid over each other by a shift and a turn about z."""
+    """RMS distance [m] of positions from links (A, 3), after alignment by a shift and a turn about z."""
     a, b = places - places.mean(axis=0), links - links.mean(axis=0)
     yaw = _turn(a, b)
     c, s = np.cos(yaw), np.sin(yaw)

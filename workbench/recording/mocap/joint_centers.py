@@ -1,6 +1,5 @@
-"""Where joints turn, as the bodies on both sides show it, and from that how far apart the joints of a link are.
-
-No link length, pivot or zero of the model goes in: a link that is not as long as drawn shows without any simulation.
+"""Estimates joint axes from the bodies on both sides, and from these the distances between the joints of a link. No link length,
+pivot or zero of the model is used, so a wrong link length in the model shows without any simulation.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from workbench.recording.mocap.tracks import SeenJoint, Tracks
 from workbench.types import Array
 
 LEAST_TURN = 0.03
-"""RMS angle [rad] by which a joint has to turn for its axis to show."""
+"""Least RMS angle [rad] of a joint whose axis can be estimated."""
 LEAST_FRAMES = 50
 PARALLEL = 0.9
-"""Cosine from which on two axes count as parallel."""
+"""Least cosine between two axes that count as parallel."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,8 @@ class Center:
 
 @dataclass(frozen=True)
 class Span:
-    """The way from one joint to the next on the body between them: what of it lies across both axes, (3,) [m] in the body's
-    frame, and the standard deviation of its length [m]."""
+    """The vector from one joint to the next on the body between them: its component perpendicular to both axes, (3,) [m] in the
+    body's frame, and the standard deviation of its length [m]."""
 
     joint: str
     following: str
@@ -73,7 +72,7 @@ def joint_center(tracks: Tracks, joint: SeenJoint) -> Center | None:
 
 
 def spans(tracks: Tracks, joints: Sequence[SeenJoint]) -> list[Span]:
-    """Of each tracked link the ways from the axis that carries it to those that it carries."""
+    """The spans of each tracked link, from the axis that carries it to those that it carries."""
     centers = {j.name: (j, c) for j in joints if (c := joint_center(tracks, j)) is not None}
     out = []
     for carrying, first in centers.values():
@@ -88,7 +87,7 @@ def spans(tracks: Tracks, joints: Sequence[SeenJoint]) -> list[Span]:
 
 
 def across(way: Array, one: Array, other: Array) -> Array:
-    """What of a way (3,) between two axes, of directions (3,) each, lies across both."""
+    """The component of a vector (3,) between two axes, of directions (3,) each, that is perpendicular to both."""
     if abs(one @ other) > PARALLEL:
         axis = one + np.sign(one @ other) * other
         axis = axis / np.linalg.norm(axis)

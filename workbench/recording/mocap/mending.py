@@ -1,4 +1,4 @@
-"""Errors of motion capture, found and where possible repaired: sign flips, exchanged labels, spikes, gaps."""
+"""Finds errors of motion capture and repairs them where possible: sign flips, exchanged labels, spikes, gaps."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 LONGEST_MENDED = 0.05
-"""Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop: nothing is invented there."""
+"""Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop, so they stay open."""
 _SPIKE = 0.06
-_ARM = 0.1  # [m] a rotation weighs as much as the way of a point this far off
+_ARM = 0.1  # [m] arm at which a rotation counts as a distance
 
 
 def mend(tracks: Tracks, model: RobotModel | None = None) -> Tracks:
-    """Poses that were not seen blanked, lengths and axes corrected, sign flips undone, exchanged labels restored, lone spikes
-    removed, gaps up to LONGEST_MENDED filled (positions linearly, rotations by slerp). Everything is reported in `problems`;
-    `model` allows lengths, axes and exchanged labels to be judged by the robot's tree."""
+    """Blanks poses that were not seen, corrects lengths and axes, undoes sign flips, restores exchanged labels, removes isolated
+    spikes, and fills gaps up to LONGEST_MENDED (positions linearly, rotations by slerp). Everything is reported in `problems`;
+    `model` allows lengths, axes and exchanged labels to be checked against the robot's tree."""
     tracks = without_unseen(tracks)
     if model is not None:
         tracks = conventional(tracks, model)
     tracks = _continuous_signs(tracks)
     tracks = unswap(tracks, model)
     tracks = _without_spikes(tracks)
-    return _filled(tracks)
+    return _fill(tracks)
 
 
 def survey(recording: Recording) -> tuple[str, ...]:
-    """What `mend` finds in a recording, a line each, without any model; for markers, how much of each is unseen."""
+    """The problems that `mend` finds in a recording, one line each, without a model; for markers, how much of each is unseen."""
     if recording.rigid_bodies:
         return mend(tracks_of(recording)).problems
     unseen = {name: int(np.isnan(p).any(axis=1).sum()) for name, p in recording.markers.items()}
@@ -55,12 +55,12 @@ def _continuous_signs(tracks: Tracks) -> Tracks:
 
 
 def distance(p: Array, q: Array, p2: Array, q2: Array) -> Array:
-    """How far two poses are apart [m], their rotation counted at an arm of 0.1 m."""
+    """Distance between two poses [m], with their rotation taken at an arm of 0.1 m."""
     return np.asarray(np.linalg.norm(p - p2, axis=-1) + _ARM * quat.angle_between(q, q2))
 
 
 def _without_spikes(tracks: Tracks) -> Tracks:
-    """Blanks short runs that leap away and back, faster than any servo moves a link."""
+    """Blanks short runs that leap away and back faster than any servo moves a link."""
     p, q, problems = tracks.p.copy(), tracks.q.copy(), list(tracks.problems)
     most = max(1, round(LONGEST_MENDED * tracks.rate))
     for i, asset in enumerate(tracks.assets):
@@ -84,12 +84,12 @@ def _without_spikes(tracks: Tracks) -> Tracks:
 
 
 def gaps_of(seen: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """Runs of False in (N,): (G, 2) first frame and one past the last."""
+    """Runs of False in a mask (N,): (G, 2), first frame and one past the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(np.int8)))
     return edges.reshape(-1, 2)
 
 
-def _filled(tracks: Tracks) -> Tracks:
+def _fill(tracks: Tracks) -> Tracks:
     p, q, reach = tracks.p.copy(), tracks.q.copy(), tracks.seconds_squared.copy()
     mended, problems = tracks.mended.copy(), list(tracks.problems)
     n = len(tracks.time)
@@ -106,7 +106,7 @@ def _filled(tracks: Tracks) -> Tracks:
             span = tracks.time[b] - tracks.time[a]
             f = (tracks.time[at] - tracks.time[a]) / span
             p[i, at] = p[i, a] + f[:, None] * (p[i, b] - p[i, a])
-            q[i, at] = quat.interpolated(tracks.time[[a, b]], q[i, [a, b]], tracks.time[at])
+            q[i, at] = quat.interpolate(tracks.time[[a, b]], q[i, [a, b]], tracks.time[at])
             reach[i, at] = f * (1 - f) * span**2
             mended[at] = True
         left = gaps[~short]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.mocap.angles import base_row, joint_angles
-from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, turned, turned_quaternion
+from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, turn_quaternion, turn_vectors
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -45,7 +45,7 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
         seen, q=seen.q - q0, zeroed=True, p_WB=p_WB - p0 + np.array([0, 0, m.origin[2]]),
         quat_WB=quat.multiply(quat_WB, quat.conjugate(quat0)), servo_q=None, links={},
         off_axis=None if seen.off_axis is None else seen.off_axis - _rest_off_axis(take),
-        bodies={a: BodyTrack(turned(b.p - [m.origin[0], m.origin[1], 0.0], -m.yaw), turned_quaternion(b.quat, -m.yaw))
+        bodies={a: BodyTrack(turn_vectors(b.p - [m.origin[0], m.origin[1], 0.0], -m.yaw), turn_quaternion(b.quat, -m.yaw))
                 for a, b in bodies.items()})
     if bodies:
         zeroed = _as_bodies_say(zeroed, bodies, m, model)
@@ -59,7 +59,7 @@ def _resting(take: Take) -> NDArray[np.bool_]:
 
 
 def _at_rest(take: Take) -> tuple[Array, Array, Array]:
-    """Mean angles (n,), base position (3,) and rotation (4,) before the first command, or at the first instant."""
+    """Mean joint angles (n,), base position (3,) and rotation (4,) before the first command, or at the first instant."""
     rest = _resting(take)
     p = np.zeros(3) if take.p_WB is None else take.p_WB[rest].mean(axis=0)
     turn = np.array([1.0, 0, 0, 0]) if take.quat_WB is None else quat.mean(take.quat_WB[rest])
@@ -110,10 +110,10 @@ def _bodies(poses: dict[str, tuple[Array, Array]], p0: Array, m: Measurement) ->
         turn = np.full((len(p_W), 4), np.nan)
         if good.any():
             turn[good] = quat.from_matrix(since_rest[good])
-        turn = turned_quaternion(turn, m.yaw)
+        turn = turn_quaternion(turn, m.yaw)
         if asset in m.frames:
             turn = quat.multiply(turn, frame_turn(asset, m))
-        out[asset] = BodyTrack(turned(p_W, m.yaw) + m.origin, quat.continuous(turn)[0])
+        out[asset] = BodyTrack(turn_vectors(p_W, m.yaw) + m.origin, quat.continuous(turn)[0])
     return out
 
 
@@ -125,7 +125,7 @@ def frame_turn(asset: str, m: Measurement) -> Array:
 
 
 def _as_bodies_say(zeroed: Take, bodies: dict[str, BodyTrack], m: Measurement, model: RobotModel) -> Take:
-    """Joint angles, and the rotation of a base whose frame is turned, read off the bodies as from a recording."""
+    """Joint angles, and the rotation of a base whose frame is turned, computed from the bodies as for a recording."""
     n = len(zeroed)
     tracks = Tracks(zeroed.time, float("nan"), tuple(bodies), np.stack([b.p for b in bodies.values()]),
                     np.stack([b.quat for b in bodies.values()]), np.zeros((len(bodies), n)), np.zeros(n, dtype=bool))

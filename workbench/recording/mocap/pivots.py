@@ -1,4 +1,4 @@
-"""Where on its link each rigid body's pivot lies, and with them the base's origin."""
+"""Estimates where each rigid body's pivot lies on its link, and from that the base's origin."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.angles import Angles, base_row
-from workbench.recording.mocap.tracks import Tracks, turned, turned_quaternion
+from workbench.recording.mocap.tracks import Tracks, turn_quaternion, turn_vectors
 from workbench.robot import RobotModel
 from workbench.types import Array
 
-_PRIOR = 0.03  # [m] how far a pivot may lie from its link's centre of mass, where the data are silent
+_PRIOR = 0.03  # [m] prior standard deviation of a pivot from its link's centre of mass
 _FRAMES = 400
-_MODEL = 1e-3  # [m] what link lengths and droop may be off by, at the least
-_CORRELATED = 10  # errors of a model last; so many frames count as one
+_MODEL = 1e-3  # [m] least standard deviation of link lengths and droop
+_CORRELATED = 10  # errors of the model persist, so this many frames count as one
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
                 rest_rotation: Array) -> Pivots:
     """Linear least squares for every pivot at once (3 unknowns each), through the kinematic tree.
 
-    With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame,
-    which is linear in all pivots. A pivot that turns with no joint, above all across the machine, is determined weakly or not at
-    all; there the link's centre of mass decides (a prior of 3 cm), and the sigma shows it. The recorded zeros correspond to
-    `rest_pose` [rad] and the base's tilt `rest_rotation` (4,).
+    With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame, which
+    is linear in all pivots. A direction in which no joint moves the pivot, above all across the machine, is determined weakly or
+    not at all; there the prior decides (the link's centre of mass, 3 cm), and the sigma shows it. The recorded zeros correspond
+    to `rest_pose` [rad] and the base's tilt `rest_rotation` (4,).
     """
     k = model.kinematics
     root = base_row(tracks, model)
@@ -48,7 +48,7 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     poses = k.forward(np.nan_to_num(q), angles.joints)
     p_B, R_B = poses[model.base]
     known = {j: np.isfinite(q[:, c]) for c, j in enumerate(angles.joints)}
-    R_WB = quat.matrix(quat.multiply(turned_quaternion(tracks.q[root, use], -yaw), rest_rotation))
+    R_WB = quat.matrix(quat.multiply(turn_quaternion(tracks.q[root, use], -yaw), rest_rotation))
     size = 3 * len(assets)
     N, rhs = np.zeros((size, size)), np.zeros(size)
     b = slice(3 * root, 3 * root + 3)
@@ -63,7 +63,7 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
         p, R = poses[link]
         p_BL = np.einsum("nji,nj->ni", R_B, p - p_B)[good]
         R_BL = np.einsum("nji,njk->nik", R_B, R)[good]
-        between = turned(tracks.p[i, use] - tracks.p[root, use], -yaw)[good]
+        between = turn_vectors(tracks.p[i, use] - tracks.p[root, use], -yaw)[good]
         y = np.einsum("nji,nj->ni", R_WB[good], between) - p_BL
         a = slice(3 * i, 3 * i + 3)
         total = R_BL.sum(axis=0)
@@ -100,4 +100,4 @@ def base_origin(tracks: Tracks, model: RobotModel, yaw: float, pivots: Mapping[s
     seen = tracks.seen[root]
     at = seen & resting if (seen & resting).any() else seen & (np.cumsum(seen) <= 1)
     offset = quat.matrix(rest_rotation) @ pivots[tracks.assets[root]]
-    return np.asarray(tracks.p[root, at].mean(axis=0) - turned(offset, yaw))
+    return np.asarray(tracks.p[root, at].mean(axis=0) - turn_vectors(offset, yaw))

@@ -1,4 +1,4 @@
-"""Finds how the robot was looked at: start, yaw, origin and pivots, and nothing else, from rest and first motion."""
+"""Finds how the cameras observed the robot (start, yaw, origin and pivots, nothing else) from its rest and first motion."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from workbench.recording.white_noise import white_noise
 from workbench.robot import RobotModel
 from workbench.types import Array
 
-_SETTLED = 0.02  # [s] before the start that are not counted as rest
-_FEW = 5  # frames of rest that are too few to tell noise from
+_SETTLED = 0.02  # [s] before the start that do not count as rest
+_FEW = 5  # with fewer frames of rest the noise is not taken from them
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,11 @@ class _Rest:
 
 def register(recording: Recording, model: RobotModel, commands: Commands | None, predicted: Take | None = None,
              starts_at: float | None = None, yaw: float | None = None, base: str = "free") -> Measurement:
-    """How the cameras observed the robot.
-
-    predicted: a simulated take of the same commands; if it is not zeroed, the pose and tilt in which it rests are taken as the
-    pose that the recorded zeros mean. Without it the commands through a lag are used. starts_at [s], yaw [rad]: given
-    instead of found (the yaw of a session: `session_yaw`). base: "free" or "fixed". Clock rate 1 and marker frames are taken as
-    stated. Logs carry
-    their own commands and clock. InputError where a start cannot be found.
+    """Finds how the cameras observed the robot. predicted: a simulated take of the same commands; if it is not zeroed, the
+    recorded zeros are taken to mean the pose and tilt in which it rests. Without it, the commands passed through a lag are used.
+    starts_at [s], yaw [rad]: known values, which are then not estimated (the yaw of a session: `session_yaw`). base: "free" or
+    "fixed". The clock rate is taken as 1, and marker frames as stated. Logs have their own commands and clock. InputError if no
+    start can be found.
     """
     if recording.sensing == "encoders":
         return _register_log(recording, model, starts_at)
@@ -68,9 +66,9 @@ def _register_log(recording: Recording, model: RobotModel, starts_at: float | No
     """A log's clock is its own; SAGE's first command may come before or after the first measurement."""
     recording = named_by_model(recording, model)
     positions = {j: recording.channels[f"position.{j}"] for j in model.joints if f"position.{j}" in recording.channels}
-    counts: dict[str, float] = {}  # servos of one kind count alike
-    steps: dict[str, float] = {}  # for those that never move, and so tell no count of theirs
-    rests: dict[str, list[Array]] = {}  # for those that rest at few places
+    counts: dict[str, float] = {}  # servos of one kind have equal counts
+    steps: dict[str, float] = {}  # for servos that never move and so do not show their count
+    rests: dict[str, list[Array]] = {}  # for servos that rest at few positions
     for joint, position in positions.items():
         kind = model.servo(joint).model
         counts[kind] = float(np.fmin(counts.get(kind, np.nan), count_that_stays(position)))
@@ -101,8 +99,8 @@ def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Comma
 
 
 def noise_at_rest(q: Array, resting: NDArray[np.bool_]) -> Array:
-    """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; where there is too little rest, their white
-    noise on the whole."""
+    """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; if there is too little rest, their white noise
+    over the whole recording."""
     out = np.full(q.shape[1], np.nan)
     for c in range(q.shape[1]):
         rest = q[resting, c][np.isfinite(q[resting, c])]
@@ -131,7 +129,7 @@ def _rest_poses(tracks: Tracks, resting: NDArray[np.bool_]) -> dict[str, tuple[A
 
 
 def _rest_of(predicted: Take | None) -> _Rest:
-    """The pose in which a simulated take rests; neutral and level where it does not say."""
+    """The pose in which a simulated take rests; neutral and level if unknown."""
     level = np.array([1.0, 0, 0, 0])
     if predicted is None or predicted.zeroed or not predicted.resting.any():
         return _Rest({}, level)

@@ -1,4 +1,5 @@
-"""When the first command went out, between frames: measured joints laid over predicted ones around their first motion."""
+"""Estimates the time of the first command, to a fraction of a frame, by aligning measured joints with predicted ones around their
+first motion."""
 
 from __future__ import annotations
 
@@ -13,13 +14,13 @@ from workbench.recording.take import Take
 from workbench.types import Array
 
 _LAG = 45.0
-"""Natural frequency [rad/s] of the second-order lag that replaces a servo where nothing was simulated."""
+"""Natural frequency [rad/s] of the second-order lag that replaces a servo if nothing was simulated."""
 _BEFORE, _AFTER = 0.05, 0.25  # [s] window around a joint's first motion
-_FINE = 0.06  # [s] how far a joint may differ from the common start
-_LEAST = np.deg2rad(1.0)  # a joint that moves less in its window says nothing
-_STAYS = 0.05  # [s] for which a joint that has begun to move is away from rest
-_FIRST = 0.08  # [s] how far the start may be from where first motions meet: some joints set out late
-_ASTRAY = 0.03  # [s] further from when joints set out, their speeds are not those predicted, and tell nothing
+_FINE = 0.06  # [s] largest difference of a joint from the common start
+_LEAST = np.deg2rad(1.0)  # joints that move less in their window are not used
+_STAYS = 0.05  # [s] least time away from rest of a joint that has begun to move
+_FIRST = 0.08  # [s] largest difference of the start from the joints' first motions: some joints start late
+_ASTRAY = 0.03  # [s] largest difference from the joints' first motions at which their speeds can be as predicted
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ class StartEstimate:
 
 
 def lagged_reference(commands: Commands) -> Take:
-    """A stand-in for a simulated take, at 1 kHz from 0.3 s before the first command: the servos' reference through a critically
-    damped second-order lag."""
+    """A substitute for a simulated take, at 1 kHz from 0.3 s before the first command: the servos' reference passed through a
+    critically damped second-order lag."""
     from scipy.signal import lfilter
 
     time = np.arange(-0.3, commands.end + 0.5, 1e-3)
@@ -50,12 +51,12 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
     """Aligns each measured joint q (N, n) [rad] (zero at rest, unless a marker frame is turned) at `time` (N,) with `predicted`
     (zeroed, 0 = first command).
 
-    First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each
-    joint on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply
-    each one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly). Where that is far from
-    when joints set out, they do not go at the speeds predicted, and setting out decides.
+    First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each joint
+    on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by the precision of each
+    (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly). If that is far from the time at which
+    joints leave rest, they do not move at the predicted speeds, and the time of leaving rest is used instead.
     """
-    q = q - _turned(time, q, noise)
+    q = q - _initial_angles(time, q, noise)
     columns = [(i, predicted.column(j)) for i, j in enumerate(joints) if j in predicted.joints]
     shift = predicted.starts_at
     tp = predicted.time - (0.0 if np.isnan(shift) else shift)
@@ -80,14 +81,14 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
         return StartEstimate(*setting_out, dict(zip(names, starts)))
     spread = 1.4826 * weighted_median(np.abs(s - middle), w)
     effective = float(w.sum() ** 2 / np.sum(w**2))
-    step = float(np.median(np.diff(tp)))  # a simulated command comes at a whole step
+    step = float(np.median(np.diff(tp)))  # simulated commands take effect at whole steps
     sigma = float(np.hypot(max(1.25 * spread / np.sqrt(effective), float(np.sum(w**2) ** -0.5)), step / 2))
     return StartEstimate(middle, sigma, dict(zip(names, starts)))
 
 
-def _turned(time: Array, q: Array, noise: Array) -> Array:
-    """Angles of joints q (N, n) in the first frames (n,), if clearly not zero: a body's marker frame is turned. Zero
-    where they are moving already, or unseen."""
+def _initial_angles(time: Array, q: Array, noise: Array) -> Array:
+    """Angles of joints q (N, n) in the first frames (n,), if clearly not zero because a body's marker frame is turned. Zero for
+    joints that are already moving, or unseen."""
     first = q[time < time[0] + _STAYS]
     half, out = len(first) // 2, np.zeros(q.shape[1])
     for c in np.flatnonzero(np.isfinite(noise)):
@@ -110,8 +111,8 @@ def _onset(t: Array, q: Array) -> float | None:
 
 def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int, int, float]],
             setting_out: tuple[float, float] | None) -> float:
-    """Start [s] on the grid of frames at which most joints agree over the first second of motion; not far from where joints set
-    out, where that is seen: a robot that rests at the end agrees with one that has not begun."""
+    """Start [s] on the grid of frames at which most joints agree over the first second of motion. It must be close to the time at
+    which joints leave rest, if that is seen, because a robot at rest at the end looks like one that has not begun."""
     step = float(np.median(np.diff(time)))
     horizon = min(1.0 + min(onset for *_, onset in moving), float(tp[-1]))
     candidates = np.arange(time[0], max(time[-1] - 0.3 * horizon, time[0] + step), step)
@@ -124,7 +125,7 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
         good = np.isfinite(q[:, i])
         track = np.interp(time, time[good], q[good, i])
         model = np.interp(offsets, tp, qp[:, c], left=0.0)
-        # before the recording begins the robot stood still
+        # before the recording the robot stood still
         seen = np.interp(candidates[:, None] + offsets, time, track, left=0.0, right=np.nan)
         error = np.nanmean(np.square(seen - model), axis=1) / max(float(np.mean(np.square(model))), _LEAST**2)
         total += np.minimum(np.nan_to_num(error, nan=1.0), 1.0)
@@ -132,8 +133,8 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
 
 
 def _setting_out(time: Array, q: Array, tp: Array, qp: Array, pairs: list[tuple[int, int]]) -> tuple[float, float] | None:
-    """Start [s], and how far it is known [s], from when joints leave rest, recorded (columns q) against predicted (qp), whatever
-    their speeds are then: the median over joints; None where fewer than two (or one, of few) are seen to."""
+    """Start [s] and its uncertainty [s] from the times at which joints leave rest, recorded (columns q) against predicted (qp),
+    regardless of their speeds: the median over joints; None if fewer than two (or one, of few) are seen to leave rest."""
     told = [(_leaves_rest(time, q[:, i]), _leaves_rest(tp, qp[:, c])) for i, c in pairs]
     late = np.array([seen - said for seen, said in told if seen is not None and said is not None])
     if len(late) < min(2, len(pairs)):
@@ -143,8 +144,8 @@ def _setting_out(time: Array, q: Array, tp: Array, qp: Array, pairs: list[tuple[
 
 
 def _leaves_rest(t: Array, q: Array) -> float | None:
-    """When a joint q (N,) leaves rest to stay away: where a line through its first degrees meets rest. None where it does not, or
-    never rests before."""
+    """When a joint q (N,) leaves rest for good: where a line through its first degrees meets the rest position. None if it does
+    not, or was never at rest before."""
     frames = max(1, round(_STAYS / float(np.median(np.diff(t)))))
     away = np.abs(np.nan_to_num(q)) > _LEAST
     stays = np.convolve(away, np.ones(frames), mode="valid") == frames
@@ -160,7 +161,7 @@ def _leaves_rest(t: Array, q: Array) -> float | None:
 
 
 def _fine(time: Array, q: Array, tp: Array, qp: Array, onset: float, coarse: float, noise: float) -> tuple[float, float] | None:
-    """Start [s] that one joint tells, and its weight 1/variance [1/s^2]: least squares over the shift by Gauss-Newton."""
+    """Start [s] estimated from one joint, and its weight 1/variance [1/s^2]: least squares over the shift by Gauss-Newton."""
     slope = np.gradient(qp, tp)
     start = coarse
     for window in (_FINE, 0.03, 0.02, 0.02):
@@ -177,5 +178,5 @@ def _fine(time: Array, q: Array, tp: Array, qp: Array, onset: float, coarse: flo
     if abs(start - coarse) > _FINE:
         return None
     left = q[use] - np.interp(time[use] - start, tp, qp)
-    variance = max(noise**2, float(np.mean(np.square(left))))  # a joint that the model misses tells less
+    variance = max(noise**2, float(np.mean(np.square(left))))  # a joint that the model fits badly weighs less
     return start, sharpness / variance

@@ -1,4 +1,4 @@
-"""Labels of two rigid bodies that were exchanged for a while, found by their leaps and put back."""
+"""Finds labels of two rigid bodies that were exchanged for a while, by their leaps, and restores them."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 _ARM = 0.1
-_LEAP = 0.01  # [m] both leaps together; less is no matter
-_FAR_BETTER = 0.3  # exchanged, the two must fit this much better
-_STRAINED, _TORN = 0.002, 0.01  # [m] misfit of a joint that starts a search for wrong labels, that no play explains
+_LEAP = 0.01  # [m] least sum of both leaps
+_FAR_BETTER = 0.3  # factor by which two bodies must fit better when exchanged
+_STRAINED, _TORN = 0.002, 0.01  # [m] misfit of a joint, larger than any play, that starts a search for wrong labels
 _WHOLE = 0.5  # the same of all joints together, their noise included
-_NEAR = 3  # frames over which a velocity still tells where a body goes
+_NEAR = 3  # frames over which a body's path can be extrapolated
 
 
 def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
-    """Restores labels that change places. A change is detected where each of two bodies continues where the other was;
-    the frames between two changes are exchanged back. For an odd number of changes either the start or the end is wrong:
-    the robot's tree decides (joints keep their links together), or without a model the start is believed."""
+    """Restores labels that change places. A change is detected where each of two bodies continues where the other was; the frames
+    between two changes are exchanged back. If the number of changes is odd, either the start or the end is wrong: the robot's
+    tree decides (joints keep their links together); without a model, the start is taken as right."""
     known = _Seen(tracks)
     step = [known.miss(i, i, known.anywhere) for i in range(len(tracks.assets))]
     events: list[tuple[int, int, int]] = []
     for a, b in combinations(range(len(tracks.assets)), 2):
-        stay = step[a] + step[b]  # NaN where nothing came before or comes after
+        stay = step[a] + step[b]  # NaN where there is no sample before or after
         maybe = np.flatnonzero((stay > _LEAP) & (known.seen[a] | known.seen[b]))
         cross = known.miss(a, b, maybe) + known.miss(b, a, maybe)
         events += [(int(f), a, b) for f in maybe[cross < _FAR_BETTER * stay[maybe]]]
@@ -37,7 +37,7 @@ def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
         starts, right, reverse = _histories(tracks, sorted(events))
         holds = right
         if model is not None and right[-1] != right[0]:
-            holds = min((right, reverse), key=lambda h: _torn(_put_back(tracks, starts, h), model))
+            holds = min((right, reverse), key=lambda h: _total_misfit(_put_back(tracks, starts, h), model))
         tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_describe(tracks, starts, holds)))
     return tracks if model is None else _throughout(tracks, model)
 
@@ -56,7 +56,7 @@ class _Seen:
         self.next = np.minimum.accumulate(at[:, ::-1], axis=1)[:, ::-1]
 
     def miss(self, a: int, b: int, frames: NDArray[np.int64]) -> Array:
-        """How far [m] body a's next sample is from where b was, or was going; NaN where one of them is not known."""
+        """Distance [m] of body a's next sample from b's last or extrapolated position; NaN if either is unknown."""
         t = self.tracks
         after, before = self.next[a, frames], self.last[b, frames]
         good = (after < len(t.time)) & (before >= 0)
@@ -77,20 +77,20 @@ def _apart(tracks: Tracks, a: int, frames: NDArray[np.int64], p: Array, q: Array
 
 
 def _histories(tracks: Tracks, events: list[tuple[int, int, int]]) -> tuple[list[int], list[list[int]], list[list[int]]]:
-    """Frames at which segments begin; and which body each label holds in each, if the start's labels were right, and if the
-    end's were."""
+    """Frames at which segments begin, and the body behind each label in each segment, assuming first that the start's labels are
+    right, then the end's."""
     starts, holds = [0], [list(range(len(tracks.assets)))]
     for frame, a, b in events:
         now = holds[-1].copy()
         now[a], now[b] = now[b], now[a]
         starts.append(frame)
         holds.append(now)
-    called = np.argsort(holds[-1])  # what the end calls each body
+    called = np.argsort(holds[-1])  # each body's label at the end
     return starts, holds, [[int(called[body]) for body in now] for now in holds]
 
 
 def _put_back(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Tracks:
-    """Tracks in which each body has what any label said of it."""
+    """Tracks in which each body has the samples recorded for it under any label."""
     p, q, mended = tracks.p.copy(), tracks.q.copy(), tracks.mended.copy()
     for first, end, now in zip(starts, [*starts[1:], len(tracks.time)], holds):
         p[now, first:end], q[now, first:end] = tracks.p[:, first:end], tracks.q[:, first:end]
@@ -99,7 +99,7 @@ def _put_back(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Trac
 
 
 def _describe(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> list[str]:
-    """A line for each set of labels that were exchanged, from when to when."""
+    """A line for each set of exchanged labels, with the time."""
     n = len(tracks.time)
     spans: dict[tuple[int, ...], list[list[int]]] = {}
     for first, end, now in zip(starts, [*starts[1:], n], holds):
@@ -126,15 +126,14 @@ def _cycles(holds: list[int]) -> list[tuple[int, ...]]:
     return out
 
 
-def _torn(tracks: Tracks, model: RobotModel) -> float:
+def _total_misfit(tracks: Tracks, model: RobotModel) -> float:
     return sum(joint_misfit(tracks, i, j) for i, j in neighbours(tracks, model))
 
 
 def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
-    """Exchanges two labels that were wrong from the first frame to the last, if that brings together what joints should
-    hold together."""
+    """Exchanges two labels that were wrong from the first frame to the last, if that makes the joints fit."""
     pairs = neighbours(tracks, model)
-    now = _torn(tracks, model)
+    now = _total_misfit(tracks, model)
     worst = max(pairs, key=lambda pair: joint_misfit(tracks, *pair), default=None)
     if worst is None or joint_misfit(tracks, *worst) < _STRAINED:
         return tracks
@@ -143,21 +142,21 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
     for a, b in combinations(range(n), 2):
         holds = list(range(n))
         holds[a], holds[b] = b, a
-        trials.append((_torn(_put_back(tracks, [0], [holds]), model), holds))
+        trials.append((_total_misfit(_put_back(tracks, [0], [holds]), model), holds))
     best = min(misfit for misfit, _ in trials)
     if best > _WHOLE * now:
         if joint_misfit(tracks, *worst) < _TORN:
             return tracks
         names = " and ".join(tracks.assets[i] for i in worst)
-        return replace(tracks, problems=(*tracks.problems, f"{names}: no joint of the model holds them together as they move"))
-    even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # two like legs can be repaired at either joint
+        return replace(tracks, problems=(*tracks.problems, f"{names}: their motion does not fit any joint of the model"))
+    even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # with two equal legs, the exchange may be at either joint
     holds = min(even, key=lambda h: _out_of_place(_put_back(tracks, [0], [h]), model))
     fixed = _put_back(tracks, [0], [holds])
     return replace(fixed, problems=(*tracks.problems, *_describe(tracks, [0], [holds])))
 
 
 def _out_of_place(tracks: Tracks, model: RobotModel) -> float:
-    """RMS [m] by which bodies, where first seen, miss their links' centres of mass in the neutral pose, at the best yaw."""
+    """RMS distance [m] of the bodies' first positions from their links' centres of mass in the neutral pose, at the best yaw."""
     k = model.kinematics
     poses = k.forward(np.zeros((1, len(k.joints))))
     rows = [i for i, asset in enumerate(tracks.assets) if asset in model.rigid_bodies and tracks.seen[i].any()]

@@ -16,10 +16,10 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 FARTHEST = 1000.0
-"""From the capture's origin [m]; no volume is as large."""
+"""Largest distance from the capture's origin [m]; no capture volume is larger."""
 NOT_UNIT = 2e-3
-"""By which a quaternion of four digits still misses unit length."""
-_MAX_HOLE = 20  # a clock with more than this many missing frames for each one seen is not filled up
+"""Deviation from unit length that a quaternion written with four digits may have."""
+_MAX_HOLE = 20  # a clock with more missing frames than this for each one seen is left with holes
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,15 @@ def capture_axes(v: Array) -> Array:
     return np.stack([v[..., 0], v[..., 2], -v[..., 1]], axis=-1)
 
 
-def turned(v: Array, yaw: float) -> Array:
-    """Vectors (..., 3) turned about up by `yaw` [rad]."""
+def turn_vectors(v: Array, yaw: float) -> Array:
+    """Turns vectors (..., 3) about the vertical by `yaw` [rad]."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1], v[..., 2]], axis=-1)
 
 
-def turned_quaternion(q: Array, yaw: float) -> Array:
-    """Rotations (..., 4) written in axes turned back: their vector part turned by `yaw` about up."""
-    return np.concatenate([q[..., :1], turned(q[..., 1:], yaw)], axis=-1)
+def turn_quaternion(q: Array, yaw: float) -> Array:
+    """Expresses rotations (..., 4) in axes turned back: turns their vector part by `yaw` about the vertical."""
+    return np.concatenate([q[..., :1], turn_vectors(q[..., 1:], yaw)], axis=-1)
 
 
 def check_assets(recording: Recording, model: RobotModel) -> None:
@@ -109,15 +109,15 @@ def tracks_of(recording: Recording) -> Tracks:
 
 
 def _odd(asset: str, norm: Array, far: NDArray[np.bool_]) -> list[str]:
-    """Problems of a body's numbers: quaternions that are not of unit length, places that no capture volume contains."""
+    """Problems of a body's numbers: quaternions that are not of unit length, positions outside any capture volume."""
     out = []
     lengths = norm[np.isfinite(norm) & (norm > 0)]
     off = lengths[np.abs(lengths - 1) > NOT_UNIT]
     if len(off) > 0.01 * len(lengths):
         out.append(f"{asset}: {len(off)} of {len(lengths)} quaternions are not of unit length ({off.min():.4g} to "
-                   f"{off.max():.4g}); made so, or, beyond 0.5 to 2, not seen")
+                   f"{off.max():.4g}); normalised, or treated as unseen beyond 0.5 to 2")
     if far.any():
-        out.append(f"{asset}: {int(far.sum())} frame(s) more than {FARTHEST:g} m away: not seen")
+        out.append(f"{asset}: {int(far.sum())} frame(s) more than {FARTHEST:g} m away: treated as unseen")
     return out
 
 

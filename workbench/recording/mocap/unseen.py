@@ -1,4 +1,4 @@
-"""Poses that no camera saw although the file has numbers there: lost bodies at the origin, and poses that are held."""
+"""Poses that no camera saw, although the file contains numbers: lost bodies at the origin, and repeated poses."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from workbench.recording.runs import runs_of_true
 from workbench.types import Array
 
 _APART = 0.02
-"""From a lost body at the origin to where it is seen before or after [m]: no walking robot gets as far in a frame."""
-_FEW = 20  # poses that tell no noise
+"""Least distance [m] from a lost body at the origin to where it is seen before or after: no walking robot gets as far in a
+frame."""
+_FEW = 20  # too few poses to estimate noise
 _ALTERNATES = -0.4
 """Correlation of neighbouring third differences below which they are noise: -0.75 for white noise, towards 1 for motion."""
 _ROUNDINGS = 1.5
-"""Noise of so many units of the last digit never repeats a pose of seven numbers by chance."""
-_LEAST = 1e-7  # of noise [m]
+"""With noise of at least this many units of the last digit, a pose of seven numbers never repeats by chance."""
+_LEAST = 1e-7  # least noise [m]
 _RUN, _LEAP, _LEAST_LEAP = 4, 3.0, 0.003
-"""Where noise is below the last digit a body that stands is held if it stands so many frames, and then leaps by so many times
-its largest other step, and so far [m]."""
+"""If noise is below the last digit, a body at rest counts as held if it rests for this many frames and then leaps by this
+multiple of its largest other step, and this far [m]."""
 
 
 def without_unseen(tracks: Tracks) -> Tracks:
-    """Blanks the poses in which a body was not seen; told in `problems`."""
+    """Blanks the poses in which a body was not seen, and reports them in `problems`."""
     p, q, problems = tracks.p.copy(), tracks.q.copy(), list(tracks.problems)
     rate = None
     for i, asset in enumerate(tracks.assets):
         lost = _lost(p[i], q[i])
         if lost.any():
-            problems.append(f"{asset}: {int(lost.sum())} frame(s) at the origin without a rotation: lost, not seen")
+            problems.append(f"{asset}: {int(lost.sum())} frame(s) at the origin without a rotation: lost; treated as unseen")
             p[i, lost], q[i, lost] = np.nan, np.nan
         held = _repeats(p[i], q[i])
         if not held.any():
@@ -77,7 +78,7 @@ def _repeats(p: Array, q: Array) -> NDArray[np.bool_]:
 
 
 def _leaps(p: Array, last: int) -> bool:
-    """Whether a body (N, 3) [m] leaves the place of row `last`, where it stood, by a step that it makes nowhere else."""
+    """Whether a body (N, 3) [m] leaves its rest at row `last` by a step larger than any other."""
     steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
     others = np.delete(steps, last) if last < len(steps) else steps
     return last < len(steps) and bool(steps[last] > max(_LEAP * np.max(others, initial=0.0), _LEAST_LEAP))

@@ -1,4 +1,4 @@
-"""The robot's heading in the capture's axes, from the axes about which its joints turn."""
+"""Finds the robot's heading in the capture's axes from the axes about which its joints turn."""
 
 from __future__ import annotations
 
@@ -11,13 +11,21 @@ from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
-from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, relative_rotation, seen_joints, tracks_of, turned
+from workbench.recording.mocap.tracks import (
+    SeenJoint,
+    Tracks,
+    check_assets,
+    relative_rotation,
+    seen_joints,
+    tracks_of,
+    turn_vectors,
+)
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
 from workbench.types import Array
 
-_LEAST = np.deg2rad(2.0)  # a joint that turns less says little about its axis
+_LEAST = np.deg2rad(2.0)  # a joint that turns less determines its axis poorly
 _CLEAR = 0.3
 
 
@@ -33,7 +41,7 @@ class YawEstimate:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Of one joint in one take: horizontal direction (mod pi) in which its rotation vectors lie, less the model's [rad], its
+    """Evidence of one joint in one take: horizontal direction (mod pi) of its rotation vectors, less the model's [rad], and its
     variance [rad^2]."""
 
     joint: str
@@ -45,16 +53,16 @@ def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Se
                 ) -> YawEstimate:
     """One yaw for all takes of a session, whose capture frame does not move (docs/formats.md, section 1).
 
-    In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so what tells the
-    yaw is the axes of the relative rotations. Each joint's is the first principal axis of its rotation vectors; the weighted
-    median over joints and takes is robust to a loose mount. Half a turn stays open: where the bodies stand decides,
-    else the sign in which joints follow their commands.
+    In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so the axes of the
+    relative rotations give the yaw. Each joint's axis is the first principal axis of its rotation vectors; the weighted median
+    over joints and takes is robust to a loose mount. That leaves half a turn undetermined: the positions of the bodies decide,
+    else the sign with which joints follow their commands.
     """
-    tracks = [_prepared(r, model) for r in recordings if r.sensing == "mocap"]
+    tracks = [_prepare(r, model) for r in recordings if r.sensing == "mocap"]
     return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))])
 
 
-def _prepared(recording: Recording, model: RobotModel) -> Tracks:
+def _prepare(recording: Recording, model: RobotModel) -> Tracks:
     check_assets(recording, model)
     return conventional(without_unseen(tracks_of(recording)), model)
 
@@ -72,15 +80,15 @@ def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Comman
     weight = 1 / np.array([e.variance for e in evidence])
     doubled = np.sum(weight * np.exp(2j * angle))  # directions, not vectors: mod pi
     start = float(np.angle(doubled) / 2)
-    off = _wrapped(angle - start, np.pi)
+    off = _wrap(angle - start, np.pi)
     yaw = start + weighted_median(off, weight)
-    off = _wrapped(angle - yaw, np.pi)
+    off = _wrap(angle - yaw, np.pi)
     spread = 1.4826 * weighted_median(np.abs(off), weight)
     effective = float(weight.sum() ** 2 / (weight**2).sum())
     sigma = max(1.25 * spread / np.sqrt(effective), float(weight.sum() ** -0.5))
     if _faces_backwards(takes, model, commands, yaw, base):
         yaw += np.pi
-    yaw = float(_wrapped(np.array(yaw), 2 * np.pi))
+    yaw = float(_wrap(np.array(yaw), 2 * np.pi))
     by_joint: dict[str, float] = {}
     for name in dict.fromkeys(e.joint for e in evidence):
         mine = [i for i, e in enumerate(evidence) if e.joint == name]
@@ -88,12 +96,12 @@ def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Comman
     return YawEstimate(yaw, float(sigma), by_joint)
 
 
-def _wrapped(angle: Array, period: float) -> Array:
+def _wrap(angle: Array, period: float) -> Array:
     return np.asarray(np.mod(angle + period / 2, period) - period / 2)
 
 
 def weighted_median(values: Array, weights: Array) -> float:
-    """Middle of the weight, between the two values that straddle it."""
+    """Weighted median, interpolated between the two values around the middle of the weight."""
     order = np.argsort(values)
     v, w = values[order], weights[order]
     share = (np.cumsum(w) - w / 2) / w.sum()
@@ -111,7 +119,7 @@ def _axis_evidence(tracks: Tracks, joint: SeenJoint) -> list[_Evidence]:
         return []
     found = vectors[:, 2]
     angle = np.arctan2(found[1], found[0]) - np.arctan2(joint.axis[1], joint.axis[0])
-    noise = max(values[1], 1e-8)  # across the axis
+    noise = max(values[1], 1e-8)  # perpendicular to the axis
     return [_Evidence(joint.name, float(angle), noise / (values[2] * len(r)) / level**2)]
 
 
@@ -135,7 +143,7 @@ def _layout(tracks: Tracks, model: RobotModel, yaw: float) -> float:
             link = model.rigid_bodies[asset]
             p, R = poses[link]
             nominal.append((p[0] + R[0] @ k.centers.get(link, np.zeros(3)))[:2])
-            found.append(turned(tracks.p[i, at[0]], -yaw)[:2])
+            found.append(turn_vectors(tracks.p[i, at[0]], -yaw)[:2])
     if len(found) < 3:
         return 0.0
     a, b = np.array(found) - np.mean(found, axis=0), np.array(nominal) - np.mean(nominal, axis=0)
@@ -144,13 +152,13 @@ def _layout(tracks: Tracks, model: RobotModel, yaw: float) -> float:
 
 
 def _following(tracks: Tracks, model: RobotModel, commands: Commands | None, yaw: float, base: str) -> float:
-    """Sum over joints [rad] of how far they turned to the side to which commands turn them further; needs no start."""
+    """Sum over joints [rad] of how far they turned towards the side to which commands move them further; needs no start."""
     assert commands is not None
     total = 0.0
     for joint in seen_joints(tracks.assets, model, base)[0]:
         if joint.name not in commands.joints:
             continue
-        q = quat.swing_twist(relative_rotation(tracks, joint), turned(joint.axis, yaw))[0]
+        q = quat.swing_twist(relative_rotation(tracks, joint), turn_vectors(joint.axis, yaw))[0]
         goals = commands.goals[:, commands.column(joint.name)]
         high, low = float(np.nanmax(q)), float(np.nanmin(q))
         asked = float(goals.max() + goals.min())

@@ -1,1 +1,1 @@
-"""Checks of servo logs: units, state, leaps, lead over the goal, plausibility against the robot."""
+"""Checks of servo logs: units, state, leaps, goals that lag the motion, plausibility for the robot."""

@@ -1,4 +1,5 @@
-"""Single readings that deviate from a joint's path by less than a leap: values that a bus writes when a servo did not answer."""
+"""Finds isolated readings that deviate from a joint's path by less than a leap: values that a bus writes when a servo did not
+answer."""
 
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ def without_astray(time: Array, position: Array, c: AstrayChecks = ASTRAY) -> tu
     values = position[seen]
     off = _off(values, c)
     returning = [v for v, n in zip(*np.unique(values[off], return_counts=True)) if n > 1]
-    if returning:  # a value that stands for "no answer" is one also where the joint is not far from it
+    if returning:  # a value that means "no answer" does so even when the joint is close to it
         off |= np.isin(values, returning) & _alone(values, c)
     if not off.any() or off.mean() > c.most:
         return position, []
@@ -69,7 +70,7 @@ def _excursions(values: Array, width: int, c: AstrayChecks) -> list[int]:
     before, after = values[k - 1], values[k + width]
     away = np.stack([values[k + i] - before - (after - before) * (i + 1) / (width + 1) for i in range(width)])
     far = np.where((np.sign(away) == np.sign(away[0])).all(axis=0), np.abs(away).min(axis=0), 0.0)
-    beside = (before - values[k - 2] + values[k + width + 1] - after) / 2  # what the joint moves in a row there
+    beside = (before - values[k - 2] + values[k + width + 1] - after) / 2  # the joint's motion per row there
     goes_on = np.abs(after - before - beside * (width + 1)) < far / 2
     bend = np.zeros(len(values))
     bend[1:-1] = np.abs(values[1:-1] - (values[:-2] + values[2:]) / 2)
@@ -83,7 +84,7 @@ def _excursions(values: Array, width: int, c: AstrayChecks) -> list[int]:
 
 
 def _alone(values: Array, c: AstrayChecks) -> NDArray[np.bool_]:
-    """Which of values (N,) lie outside what their neighbours are between, by more than `again` of the way between those."""
+    """Which of values (N,) lie outside the range of their neighbours by more than `again` times that range."""
     off = np.zeros(len(values), dtype=bool)
     before, here, after = values[:-2], values[1:-1], values[2:]
     outside = np.maximum(here - np.maximum(before, after), np.minimum(before, after) - here)

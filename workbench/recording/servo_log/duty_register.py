@@ -1,7 +1,7 @@
-"""A column that is a servo's register of duty, and the law of the servo read from it, without dynamics.
+"""Recognises a column that is a servo's duty register, and reads the servo's law from it, without dynamics.
 
-A Feetech's register of load holds the duty of its H-bridge: 0 to 1000, bit 10 (1024) the sign. Its law is then in plain sight:
-duty against the distance between a goal, delayed and ramped, and the position. """
+A Feetech's register of load holds the duty of its H-bridge: 0 to 1000, bit 10 (1024) the sign. It shows the servo's law directly:
+duty as a function of the distance between a goal, delayed and ramped, and the position."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ class RegisterLaw:
 
 
 def duty_of(column: Array, error: Array, on: Mask, c: RegisterChecks = REGISTER) -> Array | None:
-    """Duty (N,), -1 to 1 as the position's sign goes, of a column that holds the register; None where it is something else.
-    error: goal less position (N,) [rad]; on: rows with torque."""
+    """Duty (N,), -1 to 1 with the position's sign, of a column that holds the register; None if it is something else. error: goal
+    less position (N,) [rad]; on: rows with torque."""
     known = np.isfinite(column)
     if known.sum() < c.fewest or not (column[known] != 0).any():
         return None
@@ -91,8 +91,8 @@ def duty_of(column: Array, error: Array, on: Mask, c: RegisterChecks = REGISTER)
 
 @dataclass(frozen=True)
 class RegisterLog:
-    """Of one servo: goal, position [rad] and duty (N,) in rows at times (N,) [s], in which of them torque was on, and its nominal
-    gain [duty/rad]."""
+    """The log of one servo: goal, position [rad] and duty (N,) in rows at times (N,) [s], the rows in which torque was on, and
+    its nominal gain [duty/rad]."""
 
     time: Array
     goal: Array
@@ -103,8 +103,7 @@ class RegisterLog:
 
 
 def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> RegisterLaw | None:
-    """The law that the duty of one servo obeys in several logs, their gains in the nominal proportion; None where they do not
-    tell one."""
+    """The law of one servo's duty in several logs, whose gains have the nominal ratios; None if the logs do not determine one."""
     used = [log.on & np.isfinite(log.duty) & np.isfinite(log.goal) & np.isfinite(log.position)
             & (log.time > log.time[0] + c.start) for log in logs]
     kept = [(log, rows) for log, rows in zip(logs, used) if rows.sum() >= c.fewest]
@@ -118,7 +117,7 @@ def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> Registe
         out = []
         for log, rows in kept:
             steep = k * gain * log.gain
-            e = ramped(log.time, log.goal, log.time - delay, 1.0 / max(slowness, 1e-6)) - log.position
+            e = ramp_goals(log.time, log.goal, log.time - delay, 1.0 / max(slowness, 1e-6)) - log.position
             law = np.sign(e) * steep * np.maximum(np.abs(e) - zone, 0.0) + p * np.tanh(e / c.soft)
             out.append((log.duty - np.clip(law, -1.0, 1.0))[rows] / steep)
         return np.asarray(np.concatenate(out) / c.error)
@@ -161,9 +160,9 @@ def _slope(log: RegisterLog, rows: Mask) -> float:
     return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 0.0
 
 
-def ramped(sent: Array, goal: Array, at: Array, speed: float) -> Array:
-    """Where a servo's own goal is (M,) [rad] at times `at` (M,) [s], of goals (N,) [rad] sent at times (N,) [s], each held
-    until the next, if it goes at `speed` [rad/s] at most."""
+def ramp_goals(sent: Array, goal: Array, at: Array, speed: float) -> Array:
+    """A servo's internal goal (M,) [rad] at times `at` (M,) [s] if it moves at no more than `speed` [rad/s] towards goals (N,)
+    [rad], sent at times (N,) [s] and each held until the next."""
     if np.isinf(speed):
         return np.asarray(goal[np.clip(np.searchsorted(sent, at, side="right") - 1, 0, None)])
     times, values = [float(sent[0])], [float(goal[0])]

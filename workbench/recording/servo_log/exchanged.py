@@ -1,4 +1,4 @@
-"""Joints whose columns are exchanged: a position that follows another joint's goals, and not its own."""
+"""Finds joints whose columns are exchanged: the position follows another joint's goals instead of its own."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from workbench.recording.servo_log.response import fit_response, shapes
 
 @dataclass(frozen=True)
 class ExchangeChecks:
-    """own: share of a position's variance that its own goals give at most. other: and another joint's at least, and by `better`
-    more; or its own goals leave `times` as much of it. The other joint's own goals then give at most `neither`, or the two
-    positions correlate by `same`. most: rows that are looked at, evenly chosen. goes: joints and goals that move less tell
-    nothing [deg]."""
+    """own: largest share of a position's variance explained by its own goals. other: least share explained by another joint's
+    goals, which must also be `better` more; or its own goals leave `times` as much unexplained. The other joint's own goals then
+    explain at most `neither`, or the two positions correlate by `same`. most: rows that are used, evenly chosen. goes: joints and
+    goals that move less are not used [deg]."""
 
     own: float = 0.6
     other: float = 0.8
@@ -49,19 +49,19 @@ def find_exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -
 
 
 def _better(own: float, other: float, c: ExchangeChecks) -> bool:
-    """Whether another joint's goals give so much more of a position's variance than its own."""
+    """Whether another joint's goals explain sufficiently more of a position's variance than its own."""
     plain = own <= c.own and other >= max(c.other, own + c.better)
     return plain or 1 - own > c.times * (1 - other)
 
 
 def _same(one: JointLog, other: JointLog, c: ExchangeChecks) -> bool:
-    """Whether two joints have one and the same position: a column that stands there twice."""
+    """Whether two joints have the same position: a duplicated column."""
     position = np.interp(other.time, one.time, one.position)
     return bool(np.ptp(position) > 0 and np.corrcoef(position, other.position)[0, 1] > c.same)
 
 
 def _explained_share(asked: JointLog, moved: JointLog, c: ExchangeChecks) -> float:
-    """Share of a position's variance that a joint's goals give; negative where it goes the other way."""
+    """Share of a position's variance that a joint's goals explain; negative if it moves in the opposite direction."""
     each = max(1, len(moved.rows) // c.most)
     time, position = moved.time[::each], moved.position[::each]
     rows = np.clip(np.searchsorted(asked.time, time + 1e-9, side="right") - 1, 0, len(asked.time) - 1)

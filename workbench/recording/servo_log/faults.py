@@ -1,4 +1,4 @@
-"""Faults of a servo log joint by joint: corrected where that is certain, excluded from the evidence where not."""
+"""Faults of a servo log, joint by joint: corrected if the correction is certain, else excluded from the evidence."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from workbench.recording.servo_log.let_go import lets_go
 from workbench.recording.servo_log.no_answer import without_no_answer
 from workbench.recording.servo_log.relative import relative_goals
 from workbench.recording.servo_log.repeats import without_repeats
-from workbench.recording.servo_log.unlike import none_follows, rounded, unlike
+from workbench.recording.servo_log.unlike import find_rounding, none_follows, unlike
 from workbench.recording.servo_log.zero_shift import zero_shifts
 
 
 @dataclass(frozen=True)
 class Mended:
-    """recording: with certain faults corrected and unusable values blanked (NaN). lines: of each joint that has one.
-    no_goals: joints whose goals are not theirs, which are not examined further."""
+    """recording: with certain faults corrected and unusable values blanked (NaN). lines: by joint. no_goals: joints whose goals
+    are not their own, which are not examined further."""
 
     recording: Recording
     lines: tuple[str, ...]
@@ -30,14 +30,14 @@ class Mended:
 
 
 def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) -> Mended:
-    """A servo log without the readings that were not taken, with its zeros set right, and without the evidence of joints whose
-    goals are none or that their servos let go. skipped: joints of which another check has told already."""
+    """A servo log without readings that the servo did not give, with its zeros corrected, and without the evidence of joints that
+    do not have their own goals, or whose servos released them. skipped: joints that another check has already reported."""
     channels, lines = dict(recording.channels), []
     joints = [j for j in recording.joints if f"position.{j}" in channels and j not in skipped]
     coarse = set()
     for joint in joints:
         name = f"position.{joint}"
-        if (text := rounded(channels[name])) is not None:  # its steps look like leaps
+        if (text := find_rounding(channels[name])) is not None:  # whose steps look like leaps
             coarse.add(joint)
             lines.append(f"{name}: {text}")
             continue
@@ -62,8 +62,8 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
             continue
         said = []
         if joint not in coarse:
-            log, said = _zeroed(channels, log)
-            said += _released(channels, recording, log)
+            log, said = _undo_zero_shift(channels, log)
+            said += _blank_released(channels, recording, log)
         lines += said or [f"position.{joint}: {text}" for text in list(held_back(log)) or unlike(log)]
     if not any("does not follow" in text for text in lines):
         alone = none_follows({j: log for j, log in logs.items() if j not in no_goals})
@@ -73,7 +73,7 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     return Mended(replace(recording, channels=channels), tuple(lines), frozenset(no_goals))
 
 
-def _zeroed(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, list[str]]:
+def _undo_zero_shift(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, list[str]]:
     name = f"position.{log.name}"
     off, said = zero_shifts(log)
     if not said:
@@ -84,7 +84,7 @@ def _zeroed(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, l
     return replace(log, position=log.position - off), [f"{name}: {text}" for text in said]
 
 
-def _released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
+def _blank_released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
     """Blanks the positions of a joint where it does not depend on its goals, and reports that."""
     name = f"position.{log.name}"
     out = []

@@ -1,4 +1,4 @@
-"""How a joint follows its goals: later by a lag, over a share of the way, off by a constant."""
+"""How a joint follows its goals: with a lag, a gain and a constant offset."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class FollowChecks:
-    """longest: lags tried [s]. most: how many lags, at equal distances. fewest: rows that tell. goes: a goal or a joint that
-    moves less tells nothing [deg]."""
+    """longest: largest lag tried [s]. most: number of lags, evenly spaced. fewest: least number of usable rows. goes: goals and
+    joints that move less are not used [deg]."""
 
     longest: float = 0.4
     most: int = 25
@@ -53,7 +53,7 @@ class JointLog:
 
 
 def joint_logs(r: Recording, c: FollowChecks = FOLLOW) -> dict[str, JointLog]:
-    """The joints of a log that tell something, by name; a blank goal repeats the last one."""
+    """The usable joints of a log, by name; a blank goal repeats the last one."""
     out = {}
     for joint in r.joints:
         goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")
@@ -67,7 +67,7 @@ def joint_logs(r: Recording, c: FollowChecks = FOLLOW) -> dict[str, JointLog]:
     return out
 
 
-def followed(time: Array, goal: Array, position: Array, c: FollowChecks = FOLLOW) -> Followed:
+def fit_following(time: Array, goal: Array, position: Array, c: FollowChecks = FOLLOW) -> Followed:
     """The lag, gain and offset with which positions (N,) [rad] follow goals (N,) [rad] at times (N,) [s] best."""
     nothing = Followed(0.0, 0.0, float(position.mean()) if len(position) else 0.0, 0.0)
     if len(time) < 3 or np.ptp(goal) == 0 or np.ptp(position) == 0:

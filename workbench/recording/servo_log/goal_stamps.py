@@ -57,7 +57,7 @@ def sent_goals(rows: Array, c: StampChecks = CHECKS) -> Sent | None:
         return None
     periods = middle + np.linspace(-1.5, 1.5, c.tries) / index[-1]
     left = rows[None, :] - periods[:, None] * index[None, :]
-    earliest, latest = left.max(axis=1) - 1, left.min(axis=1)  # sent after the row before, at the latest in its own
+    earliest, latest = left.max(axis=1) - 1, left.min(axis=1)  # sent after the previous row, at the latest in its own
     best = int(np.argmax(latest - earliest))
     if latest[best] <= earliest[best]:
         return None

@@ -1,4 +1,4 @@
-"""Joints that do not obey their goals: that never follow, that stop at one value, or that differ by a constant."""
+"""Finds joints that do not obey their goals: that never follow, that stop at one value, or that differ by a constant."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from workbench.recording.servo_log.response import Response, fit_response, shape
 
 @dataclass(frozen=True)
 class HeldBackChecks:
-    """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves
-    over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its
-    extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
-    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain of 1 +- `tolerance`, to
-    `explained` of its variance, and with a residual of at most `share` of that distance."""
+    """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves over less than
+    `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its extreme reading, to the
+    last digit, while its goals are `beyond` further [deg]; `visits`: least number of such rests, each of at least `rows` rows.
+    off: a constant distance from the goals [deg], of a joint that follows them with a gain of 1 +- `tolerance`, to `explained` of
+    its variance, and with a residual of at most `share` of that distance."""
 
     goes: float = 5.0
     follows: float = 0.3
@@ -37,7 +37,7 @@ HELD_BACK = HeldBackChecks()
 
 
 def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
-    """A line for what keeps a joint from its goals in the whole log, without the channel's name."""
+    """A line for what keeps a joint from its goals throughout the log, without the channel's name."""
     if np.rad2deg(np.ptp(log.goal)) < c.goes:
         return
     shaped = shapes(log.time, log.goal)
@@ -70,5 +70,5 @@ def _stands_off(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str
     away = np.rad2deg(log.position - (fit.predicted - fit.offset) / fit.gain)
     middle = float(np.median(away))
     if abs(middle) > c.off and np.rad2deg(fit.spread) < c.share * abs(middle):
-        yield (f"is {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
+        yield (f"is {middle:+.1f} deg from goal.{log.name} throughout, although it follows it: are their zeros the same (a "
                "homing offset, a horn turned by a tooth)?")

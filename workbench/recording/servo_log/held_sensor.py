@@ -1,8 +1,8 @@
 """A sensor that is refreshed more slowly than it is read: its positions are older than their stamps, by a varying amount.
 
-A servo measures its position every few milliseconds and answers with the last value. Where that period is close to the log's
-own, the age of the readings cycles: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake.
-Period and phase are estimated from the log alone: positions then lie best on a line between their neighbours. """
+A servo measures its position every few milliseconds and answers with the last value. If that period is close to the log's own,
+the age of the readings cycles: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake. Period and
+phase are estimated from the log alone, as those at which positions lie closest to the line between their neighbours."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ HELD = HeldChecks()
 
 @dataclass(frozen=True)
 class Refresh:
-    """period, phase [s]: the sensor is refreshed at phase + k period on the log's clock. left: share of the error of
-    interpolation that is left with positions at those times."""
+    """period, phase [s]: the sensor is refreshed at phase + k period on the log's clock. left: remaining share of the
+    interpolation error with positions at those times."""
 
     period: float
     phase: float
@@ -58,8 +58,8 @@ class Refresh:
 
 
 def refresh_of(time: Array, position: Array, c: HeldChecks = HELD) -> Refresh | None:
-    """How a sensor whose positions (N,) [rad] were read at times (N,) [s] is refreshed; None where it is not held, or the log
-    does not tell."""
+    """How a sensor whose positions (N,) [rad] were read at times (N,) [s] is refreshed; None if it is not held, or if the log
+    does not show it."""
     known = np.isfinite(position)
     t, q = time[known], position[known]
     if len(t) < c.fewest or np.percentile(np.abs(np.diff(q)), 90) < c.counts * max(resolution(q), 1e-9):
@@ -67,7 +67,7 @@ def refresh_of(time: Array, position: Array, c: HeldChecks = HELD) -> Refresh | 
     row = float(np.median(np.diff(t)))
     first = _fastest(q, c.span)
     t0, q0 = t[first], q[first]
-    step = c.drift * row / (len(t0) / c.shortest)  # of the period: what ages drift by over these rows
+    step = c.drift * row / (len(t0) / c.shortest)  # step of the period: the drift of the ages over these rows
     periods = np.arange(c.shortest * row, c.longest * row, step)
     scores = _errors(t0, q0, periods, c)
     if scores.min() > c.hopeless * _plain(t0, q0, c):
@@ -102,7 +102,7 @@ def at_their_stamps(time: Array, position: Array, refresh: Refresh) -> Array:
 
 
 def _fastest(q: Array, span: int) -> slice:
-    """The rows of most motion."""
+    """The rows with the most motion."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))])
     if len(q) <= span:
         return slice(0, len(q))
@@ -116,13 +116,13 @@ def _around(rows: slice, count: int, most: int) -> slice:
 
 
 def _lowest(scores: Array, count: int) -> list[int]:
-    """Where the score is lowest, no two of them neighbours."""
+    """Indices of the lowest scores, no two of them adjacent."""
     local = np.flatnonzero((scores <= np.roll(scores, 1)) & (scores <= np.roll(scores, -1)))
     return [int(k) for k in local[np.argsort(scores[local])][:count]]
 
 
 def _errors(t: Array, q: Array, periods: Array, c: HeldChecks) -> Array:
-    """For each period (K,) the error of interpolation at its best phase."""
+    """The interpolation error of each period (K,) at its best phase."""
     out = np.full(len(periods), np.inf)
     chunk = max(1, 400_000 // len(t))
     for begin in range(0, len(periods), chunk):
@@ -134,12 +134,12 @@ def _errors(t: Array, q: Array, periods: Array, c: HeldChecks) -> Array:
 
 
 def _plain(t: Array, q: Array, c: HeldChecks) -> float:
-    """The error of interpolation with positions at their stamps."""
+    """The interpolation error with positions at their stamps."""
     return float(np.minimum(np.abs(_interpolation(t[None, :], q)), c.cut).sum())
 
 
 def _phase(t: Array, q: Array, period: float, c: HeldChecks) -> tuple[float, float]:
-    """The error of a period at its best phase, and that."""
+    """The error of a period at its best phase, and that phase."""
     phases = np.arange(4 * c.phases) / (4 * c.phases) * period
     errors = _at(t, q, np.full(len(phases), period), phases, c)
     best = int(np.argmin(errors))

@@ -1,4 +1,4 @@
-"""Whether a joint precedes its goal: a servo follows, so such goals were logged late, or derived from the motion."""
+"""Detects joints that precede their goals: a servo follows, so such goals were logged late, or derived from the motion."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from workbench.types import Array
 class LeadChecks:
     """When a joint is taken to precede its goal.
 
-    longest: largest lead or lag tried [s]; share: of the log, at most, whose ends are then not used. rows: least lead, as a
-    row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS of the position with the
-    lead, relative to that with the best lag; near 1 for noise, and for a periodic motion, whose leads are lags, too (of 44 logs,
-    0.6 flags none, 0.75 one). likeness: share of the position's variance that the lead explains. goes: least motion of a joint
-    [deg]. fewest: least number of rows.
+    longest: largest lead or lag tried [s]; share: of the log, at most, whose ends are then not used. rows: least lead, as a row's
+    goal may be sent after its position was read. step: fineness of leads, in rows. better: residual RMS with the lead, relative
+    to that with the best lag; near 1 for noise, and for a periodic motion, whose leads are also lags (of 44 logs, 0.6 flags none,
+    0.75 one). likeness: share of the position's variance that the lead explains. goes: least motion of a joint [deg]. fewest:
+    least number of rows.
     """
 
     longest: float = 0.4
@@ -51,7 +51,7 @@ def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
 
 
 def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:
-    """By how long positions (N,) [rad] precede goals (N,) [rad] at times (N,) [s]; None where they do not."""
+    """The time [s] by which positions (N,) [rad] precede goals (N,) [rad] at times (N,) [s]; None if they do not."""
     row = float(np.median(np.diff(time)))
     most = min(c.longest, c.share * float(time[-1] - time[0]))
     steps = round(most / (row * c.step))

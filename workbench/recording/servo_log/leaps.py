@@ -1,4 +1,4 @@
-"""Leaps in a servo's positions that no servo makes: whole turns, wrapped registers, readings that went astray."""
+"""Finds leaps in positions that no servo can make: whole turns, wrapped registers, stray readings."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ TURN = 2 * np.pi
 _FASTEST = 40.0
 """No hobby servo turns as fast [rad/s]; the fastest reach 17."""
 _JITTER = 0.5
-"""Of a reading [rad], beyond what speed explains."""
+"""Least leap of a reading [rad], in addition to the motion at that speed."""
 _SLOWEST = 0.1
-"""Between rows [s]: at longer steps a servo can go where a leap would take it."""
+"""Longest step between rows [s]: in a longer one a servo can move as far as a leap."""
 _ASTRAY = 5
-"""Samples, or a fiftieth of the log if that is more, that may be taken out as astray."""
+"""Most samples that may be removed as stray, or a fiftieth of the log if that is more."""
 _OFF = 0.4
-"""How far a leap may be from whole turns [rad]: the joint moves on meanwhile."""
+"""Allowed difference of a leap from whole turns [rad], as the joint keeps moving."""
 
 
 def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
-    """Positions (N,) [rad] at times (N,) [s], readings astray blanked (NaN), turns and 16-bit wraps undone; and a line
-    for each."""
+    """Positions (N,) [rad] at times (N,) [s] with stray readings blanked (NaN) and turns and 16-bit wraps undone; and a line for
+    each."""
     seen = np.flatnonzero(np.isfinite(position))
     if len(seen) < 3 or float(np.median(np.diff(time))) > _SLOWEST:
         return position, []
@@ -31,8 +31,8 @@ def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
     leaps = np.abs(steps) > _JITTER + _FASTEST * np.diff(time[seen])
     if not leaps.any():
         return position, []
-    part = np.concatenate([[0], np.cumsum(leaps)])  # (seen,) which stretch between leaps
-    offset = np.concatenate([[0.0], np.cumsum(steps[leaps])])  # of each stretch against the first
+    part = np.concatenate([[0], np.cumsum(leaps)])  # (seen,) index of the stretch between leaps
+    offset = np.concatenate([[0.0], np.cumsum(steps[leaps])])  # offset of each stretch from the first
     offset -= offset[_main(position[seen], part, offset)]
     count = count_of(position[seen][np.isin(part, np.flatnonzero(np.abs(offset) < _OFF + _JITTER))])
     wrap = 65536 * (count if np.isfinite(count) else resolution(position[seen]))
@@ -59,7 +59,7 @@ def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
 
 
 def _main(position: Array, part: NDArray[np.int_], offset: Array) -> int:
-    """The stretch whose offset is the true one: of the offsets that most rows share, the one nearest to the centre."""
+    """The stretch with the true offset: of the offsets that most rows share, the one nearest to the centre."""
     key = np.round(offset / TURN, 0)
     rows = {k: int(np.isin(part, np.flatnonzero(key == k)).sum()) for k in np.unique(key)}
     often = [k for k, n in rows.items() if n > 0.3 * len(position)] or [max(rows, key=lambda k: rows[k])]
@@ -96,5 +96,5 @@ class _Said:
 
 
 def _much(count: int, rows: int) -> str:
-    """What so many leaps mean where they are no exception."""
+    """The likely reason for leaps that are too many to be exceptions."""
     return ": is it an angle, in degrees, and not a velocity, an error or an angle that wraps?" if count > 0.2 * rows else ""

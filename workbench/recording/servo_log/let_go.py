@@ -1,5 +1,5 @@
-"""Stretches in which a joint does not depend on its goals: its servo let go, or its sensor stood still; to the end, or for a
-time."""
+"""Finds stretches in which a joint does not depend on its goals, because its servo released or its sensor froze, for a time or to
+the end."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> list[tuple[int, int]]:
         fit = fit_response(shaped, log.position, told)
         if fit.explained < c.before or fit.gain < c.firm or not _goes_back(log.goal[told], c):
             continue
-        found = [s for s in _joined(log, _stretches(log.time, log.position, fit, c), fit, c)
+        found = [s for s in _join(log, _stretches(log.time, log.position, fit, c), fit, c)
                  if log.time[s[1] - 1] - log.time[s[0]] >= c.lasts and _free(log, s, fit, c)]
         rest = np.ones(len(log.time), dtype=bool)
         for first, end in found:
@@ -64,7 +64,7 @@ def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> list[tuple[int, int]]:
 
 
 def _stretches(time: Array, position: Array, fit: Response, c: LetGoChecks) -> list[tuple[int, int]]:
-    """Stretches in which the joint is off its way, each begun and ended where it is on it."""
+    """Stretches in which the joint deviates from its expected path; each begins and ends on that path."""
     away = np.abs(position - fit.predicted)
     near = np.flatnonzero(away < c.tight * fit.spread)
     out: list[tuple[int, int]] = []
@@ -77,8 +77,9 @@ def _stretches(time: Array, position: Array, fit: Response, c: LetGoChecks) -> l
     return out
 
 
-def _joined(log: JointLog, stretches: list[tuple[int, int]], fit: Response, c: LetGoChecks) -> list[tuple[int, int]]:
-    """Stretches that a crossing of the way parts, put together: between them, too, the joint stands while it is asked to move."""
+def _join(log: JointLog, stretches: list[tuple[int, int]], fit: Response, c: LetGoChecks) -> list[tuple[int, int]]:
+    """Joins stretches that are separated only by a crossing of the expected path: between them, too, the joint rests although it
+    is commanded to move."""
     out: list[tuple[int, int]] = []
     for first, end in stretches:
         if log.time[end - 1] - log.time[first] < c.bridges:
@@ -97,7 +98,7 @@ def _is_at_rest(log: JointLog, between: tuple[int, int], fit: Response, c: LetGo
 
 
 def _free(log: JointLog, stretch: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
-    """Whether in a stretch the joint goes its own way, while it is asked to move, and no stop holds it."""
+    """Whether in a stretch the joint ignores commanded motion without being held by a stop."""
     first, end = stretch
     lasts_to = log.time[end - 1] - (c.settles if end < len(log.time) else 0.0)
     settles = min(c.settles, 0.3 * float(log.time[end - 1] - log.time[first]))
@@ -118,13 +119,13 @@ def _free(log: JointLog, stretch: tuple[int, int], fit: Response, c: LetGoChecks
 
 
 def _follows(shaped: Array, log: JointLog, rest: Mask, c: LetGoChecks) -> bool:
-    """Whether outside the stretches the joint does follow its goals."""
+    """Whether the joint follows its goals outside the stretches."""
     fit = fit_response(shaped, log.position, rest)
     return fit.explained >= c.before and fit.gain >= c.firm
 
 
 def _goes_back(goal: Array, c: LetGoChecks) -> bool:
-    """Whether goals (N,) went and came back."""
+    """Whether goals (N,) moved away and back."""
     least = c.back * np.ptp(goal)
     up = np.max(goal - np.minimum.accumulate(goal))
     down = np.max(np.maximum.accumulate(goal) - goal)

@@ -1,4 +1,5 @@
-"""Stretches of one value that the joint leaps to and back from: values that a bus or a driver writes while a servo is silent."""
+"""Finds stretches of a single value to which readings leap and from which they leap back: a bus or driver writes it while a servo
+is silent."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def without_no_answer(time: Array, position: Array, c: NoAnswerChecks = NO_ANSWE
     runs = [(a, b) for a, b in runs_of_equals(values) if a > 0 and b + 1 < len(values)]
     in_runs = np.zeros(len(steps), dtype=bool)
     for a, b in runs:
-        in_runs[a - 1:b + 1] = True  # the leaps are not to be measured by themselves
+        in_runs[a - 1:b + 1] = True  # the leaps must not raise their own threshold
     usual = steps[~in_runs]
     if not len(usual):
         return position, []

@@ -1,4 +1,4 @@
-"""Channels beside goals and positions that contradict the motion, or cannot be in the unit of the format."""
+"""Finds channels other than goals and positions that contradict the motion, or cannot be in the format's unit."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.recording.recording import Recording
-from workbench.recording.servo_log.following import followed, joint_logs
+from workbench.recording.servo_log.following import fit_following, joint_logs
 from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class ChannelChecks:
-    """amperes, celsius: no hobby servo takes more [A] or stands more [deg C]. turns_off: a joint that moves so far while its
-    torque is said to be off in every row [deg], and whose position the goals explain to `follows`, has it on. faster: a joint
-    that exceeds the moving speed of its goals so many times. opposite: correlation of duty with the distance from position to
-    goal, below which it has the other sign. moves: least motion that tells [deg]. fewest: least number of rows."""
+    """amperes, celsius: no hobby servo draws more [A] or survives more [deg C]. turns_off: torque must be on in a joint that
+    moves this far [deg], and whose goals explain `follows` of its position, although every row says off. faster: factor by which
+    a joint exceeds the moving speed of its goals. opposite: correlation of duty with the distance from position to goal below
+    which its sign is wrong. moves: least usable motion [deg]. fewest: least number of rows."""
 
     amperes: float = 20.0
     celsius: float = 120.0
@@ -41,7 +41,7 @@ def channel_problems(r: Recording, c: ChannelChecks = CHANNELS) -> Iterator[str]
         if heat is not None and (most := _largest(heat)) > c.celsius:
             unit = "kelvin or tenths of a degree" if most < 1000 else "hundredths of a degree"
             yield f"temperature.{joint}: reaches {most:.4g}; expected degrees Celsius, at most {c.celsius:g}: is it in {unit}?"
-        yield from _enabled(r, joint, c)
+        yield from _check_enabled(r, joint, c)
         yield from _speed(r, joint, c)
         yield from _duty(r, joint, c)
 
@@ -53,7 +53,7 @@ def few_rows(r: Recording, c: ChannelChecks = CHANNELS) -> Iterator[str]:
         yield f"time: only {len(r.time)} row(s), expected {c.fewest} or more: was the file cut, or the log stopped at once?"
 
 
-def _enabled(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
+def _check_enabled(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
     enabled = r.channels.get(f"enabled.{joint}")
     if enabled is None or enabled.any():
         return
@@ -61,7 +61,7 @@ def _enabled(r: Recording, joint: str, c: ChannelChecks) -> Iterator[str]:
     log = joint_logs(replace(r, channels=on)).get(joint)
     if log is None or np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) < c.turns_off:
         return
-    if followed(log.time, log.goal, log.position).explained > c.follows:
+    if fit_following(log.time, log.goal, log.position).explained > c.follows:
         yield (f"enabled.{joint}: is 0 in every row while position.{joint} follows goal.{joint}: is the column inverted "
                "(1: torque on)? The joint counts as limp")
 

@@ -1,6 +1,5 @@
-"""Whether a servo log is plausible: turns that no servo makes, units that are not those of the file, sensors that freeze.
-
-Certain errors are repaired; all are reported, by joint and time.
+"""Checks whether a servo log is plausible: turns that no servo makes, wrong units, sensors that freeze. Errors are repaired if
+the repair is certain, and always reported, by joint and time.
 """
 
 from __future__ import annotations
@@ -27,14 +26,12 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class LogChecks:
-    """When a log is doubted.
-
-    slow: between rows of a servo's log [s]; more is another unit. fast: rows nearer to each other are read by no bus [s].
-    stands: how long a position may repeat to the last digit while its goal moves on by `goes` [s, deg], if it then leaps by
-    more than `leaps` of its other steps; a joint that sticks sets out slowly. far: largest distance of a goal from it at the
-    end [deg]. same: share of rows in which goal and position are equal above which the goal is no command; shift: by so many
-    rows at most. pause: between rows, in medians of their steps. longest: a log may last [s]. largest: a number of any channel,
-    beyond the range of counts of 32 bits [SI].
+    """When a log is doubted. slow: largest step between rows of a servo's log [s]; more is another unit. fast: no bus reads rows
+    closer to each other [s]. stands: how long a position may repeat to the last digit while its goal moves on by `goes` [s, deg],
+    if it then leaps by more than `leaps` of its other steps; a joint that sticks sets out slowly. far: largest distance of a goal
+    from it at the end [deg]. same: share of rows in which goal and position are equal above which the goal is no command; shift:
+    by so many rows at most. pause: between rows, in medians of their steps. longest: longest duration of a log [s]. largest:
+    largest number in any channel, beyond the range of 32-bit counts [SI].
     """
 
     slow: float = 0.5
@@ -53,12 +50,12 @@ class LogChecks:
 CHECKS = LogChecks()
 
 
-def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
+def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     """The recording with leaps of its positions repaired and reported in `problems`, with all other implausible values;
-    InputError where a number is beyond all bounds. Only of logs on one clock; cameras' tracks are repaired with the robot in
-    view."""
+    InputError if a number is beyond all bounds. Only for logs on one clock; cameras' tracks are repaired with knowledge of the
+    robot."""
     time = recording.time
-    _bounded(recording, checks)
+    _check_bounds(recording, checks)
     if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
     channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
@@ -85,13 +82,13 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines
     problems += _frozen_sensors(mended.recording, checks)
-    if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
+    if not any(text.startswith("goal.") for text in problems):  # otherwise these are not goals, or have another unit
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
     return as_logged(replace(mended.recording, problems=tuple(problems)))
 
 
-def _bounded(r: Recording, c: LogChecks) -> None:
+def _check_bounds(r: Recording, c: LogChecks) -> None:
     for name, values in r.channels.items():
         beyond = np.flatnonzero(np.abs(values) > c.largest)
         if len(beyond) and len(values) == len(r.time):
@@ -114,7 +111,8 @@ def beyond_range(recording: Recording, limits: dict[str, tuple[float, float]]) -
 
 
 def _in_another_unit(goal: Array) -> bool:
-    """Whether goals (N,) [rad] are further than a servo goes: then the joint's leaps are none, and are told as a unit."""
+    """Whether goals (N,) [rad] are beyond a servo's range: then the joint's leaps are not leaps, and the unit is reported
+    instead."""
     return bool(np.isfinite(goal).any() and np.nanmax(np.abs(goal)) > 2 * np.pi * UNITS.turns)
 
 
@@ -138,7 +136,7 @@ def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
 
 
 def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
-    for joint, goal, position, on in _commanded(r):
+    for joint, goal, position, on in _commanded_joints(r):
         both = np.isfinite(goal) & np.isfinite(position) & on
         if both.sum() < 10:
             continue
@@ -155,7 +153,7 @@ def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
 
 
 def _shift_of_equals(goal: Array, position: Array, c: LogChecks) -> int | None:
-    """By how many rows the position comes before a goal that is equal to it to the last digit; None where it is another."""
+    """The number of rows by which the position precedes a goal that equals it to the last digit; None if they differ."""
     for shift in sorted(range(-c.shift, c.shift + 1), key=abs):
         a, b = goal[max(shift, 0):len(goal) + min(shift, 0)], position[max(-shift, 0):len(position) - max(shift, 0)]
         both = np.isfinite(a) & np.isfinite(b)
@@ -165,20 +163,20 @@ def _shift_of_equals(goal: Array, position: Array, c: LogChecks) -> int | None:
 
 
 def _comes_to(goal: float, position: Array) -> bool:
-    """Whether a joint moves to a goal that stands, as in a step, and does not go to and fro."""
+    """Whether a joint moves to a constant goal, as in a step, and not to and fro."""
     way, travelled = np.abs(position - goal), float(np.abs(np.diff(position)).sum())
     return bool((way[-1] < 0.3 * way.max() or way[-1] < np.deg2rad(5)) and travelled < 3 * np.ptp(position))
 
 
 def _frozen_sensors(r: Recording, c: LogChecks) -> Iterator[str]:
-    for joint, goal, position, on in _commanded(r):
+    for joint, goal, position, on in _commanded_joints(r):
         if _shift_of_equals(goal, position, c) is not None:
             continue
         for first, last in _repeats(position):
             span = slice(first, last + 1)
             if last - first < 4 or r.time[last] - r.time[first] < c.stands or not on[span].all():
                 continue
-            inside = goal[first + 1:last]  # the goal's last step may come with the position's
+            inside = goal[first + 1:last]  # the goal's last step may coincide with the position's
             inside = inside[np.isfinite(inside)]
             if len(np.unique(inside)) < 4 or np.rad2deg(np.ptp(inside)) < c.goes:
                 continue
@@ -194,14 +192,14 @@ def _frozen_sensors(r: Recording, c: LogChecks) -> Iterator[str]:
 
 
 def _left_behind(goal: Array, position: Array, first: int, c: LogChecks) -> bool:
-    """Whether a goal goes away from a joint that stands from row `first` to the end, by `far` and by `leaps` times as much as it
-    ever was before: not as of a weak servo, or one at its stop."""
+    """Whether a goal moves away from a joint that stands still from row `first` to the end, by `far` and by `leaps` times the
+    largest earlier distance: more than with a weak servo, or one at its stop."""
     away = np.abs(goal - position)
     before = float(np.nanmax(away[:first], initial=0.0))
     return bool(np.rad2deg(np.nanmax(away[first:])) > c.far and np.nanmax(away[first:]) > c.leaps * before)
 
 
-def _commanded(r: Recording) -> Iterator[tuple[str, Array, Array, NDArray[np.bool_]]]:
+def _commanded_joints(r: Recording) -> Iterator[tuple[str, Array, Array, NDArray[np.bool_]]]:
     """Joints with both goal and position: name, both (N,) [rad], and where torque was on."""
     for joint in r.joints:
         goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")

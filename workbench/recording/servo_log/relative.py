@@ -1,4 +1,4 @@
-"""Goals that are steps, from row to row or from where the joint is, and not angles: relative actions."""
+"""Detects goals that are steps, from row to row or from the joint's position, instead of angles: relative actions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.recording.servo_log.following import JointLog, followed
+from workbench.recording.servo_log.following import JointLog, fit_following
 from workbench.recording.servo_log.response import fit_response, shapes
 from workbench.types import Array
 
@@ -47,16 +47,16 @@ _FROM_PLACE = ("looks like the way from the position to the goal: relative actio
 
 
 def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
-    """A line where goals are steps and not angles; None where they are angles, or nothing tells."""
+    """A line if goals are steps instead of angles; None if they are angles, or if that cannot be decided."""
     goal, position = log.goal, log.position
     if len(goal) < c.fewest + max(c.spans) + c.later or np.ptp(goal) == 0 or np.ptp(position) == 0:
         return None
     if _makes_set_points(goal, position, c):
         return _FROM_PLACE
-    impulses = np.mean(goal == 0) > c.rests  # steps of set points, as large as the way itself
+    impulses = np.mean(goal == 0) > c.rests  # steps of set points, as large as the motion itself
     if not impulses and np.ptp(goal) > c.smaller * np.ptp(position):
         return None
-    fit = followed(log.time, goal, position)
+    fit = fit_following(log.time, goal, position)
     if fit.explained > c.absolute and fit.gain < c.beyond:
         return None
     added = fit_response(shapes(log.time, np.cumsum(goal)), position)
@@ -71,8 +71,8 @@ def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
 
 
 def _makes_set_points(goal: Array, position: Array, c: RelativeChecks) -> bool:
-    """Whether goals added to positions stand still, to the rounding of both, in rows in which the position moves: the distances
-    to set points that step."""
+    """Whether goals added to positions are constant, to within the rounding of both, in rows in which the position moves: then
+    the goals are distances to set points that step."""
     for later in (0, 1):
         places = position[:len(position) - later]
         moved = np.flatnonzero(np.abs(np.diff(places)) > np.deg2rad(c.moved))

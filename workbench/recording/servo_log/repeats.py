@@ -1,4 +1,4 @@
-"""Readings that repeat the last one while the joint moves on, as a reader does when the bus times out."""
+"""Finds readings that repeat the last one while the joint keeps moving, as when the bus times out."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> 
         return position, []
     count = float(moving.min())
     found = [(a, b) for a, b in runs_of_equals(values) if c.rows <= b - a < c.longest and _catches_up(values, a, b, count, c)]
-    if len({values[a] for a, _ in found}) < c.stretches:  # at one angle again and again, a loop of a motion stands by itself
+    if len({values[a] for a, _ in found}) < c.stretches:  # a looped motion may rest at one angle again and again
         return position, []
     out = position.copy()
     for a, b in found:
@@ -63,7 +63,7 @@ def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> 
 
 
 def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChecks) -> bool:
-    """Whether a joint that was on its way before a repetition is, right after it, where it would be had it gone on."""
+    """Whether a joint that was moving before a repetition is, right after it, where it would be if it had kept moving."""
     if first < 1 or last + 2 >= len(values):
         return False
     n = last - first + 1
@@ -79,5 +79,5 @@ def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChe
         return False
     arrives = values[first] - values[first - 1]
     leaves = (values[last + 2 + nexts[0]] - values[last + 1]) / (nexts[0] + 1)
-    on_its_way = min(arrives * np.sign(leap), leaves * np.sign(leap)) > c.slows * slower  # else it stood there by itself
+    on_its_way = min(arrives * np.sign(leap), leaves * np.sign(leap)) > c.slows * slower  # otherwise the joint did stand still
     return bool(on_its_way and c.catches * n * slower < abs(leap) < 3 * n * faster)

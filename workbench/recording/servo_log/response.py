@@ -1,4 +1,4 @@
-"""How a servo answers its goals: late, smoothed, scaled and offset; fitted so that a part of the log may be wrong."""
+"""Fits how a servo responds to its goals (delay, smoothing, gain and offset), robustly, as a part of the log may be wrong."""
 
 from __future__ import annotations
 

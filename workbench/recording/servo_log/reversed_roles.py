@@ -1,4 +1,4 @@
-"""Joints whose goals follow their positions: the two columns are exchanged."""
+"""Finds joints whose goals follow their positions: the two columns are exchanged."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def reversed_roles(r: Recording, c: RoleChecks = ROLES) -> Iterator[tuple[str, s
     for joint, log in joint_logs(r).items():
         if np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) < c.goes or not _steps(log, c):
             continue
-        answer = _unexplained(log, log.position, log.goal)
-        if answer < c.unexplained and c.better * answer < _unexplained(log, log.goal, log.position):
+        answer = _unexplained_share(log, log.position, log.goal)
+        if answer < c.unexplained and c.better * answer < _unexplained_share(log, log.goal, log.position):
             yield joint, (f"goal.{joint}: follows position.{joint}, as only a position follows its goal: are the two columns "
                           "exchanged? The joint's evidence is left out")
 
@@ -44,6 +44,6 @@ def _steps(log: JointLog, c: RoleChecks) -> bool:
     return bool(np.mean(np.diff(log.position) != 0) < c.steps * np.mean(np.diff(log.goal) != 0))
 
 
-def _unexplained(log: JointLog, cause: Array, effect: Array) -> float:
+def _unexplained_share(log: JointLog, cause: Array, effect: Array) -> float:
     fit = fit_response(shapes(log.time, cause), effect)
     return float(np.mean((effect - fit.predicted) ** 2) / np.var(effect)) if fit.gain > 0 else 1.0

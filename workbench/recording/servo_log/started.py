@@ -1,4 +1,4 @@
-"""When a motion began in a servo log, by the log's own goals; and goals that the servo itself ramps."""
+"""Finds when a motion began in a servo log from the log's own goals, and detects goals that the servo itself ramps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Recording
-from workbench.recording.servo_log.following import followed, joint_logs
+from workbench.recording.servo_log.following import fit_following, joint_logs
 from workbench.types import Array
 
 
@@ -55,8 +55,8 @@ def start_in_log(r: Recording, commands: Commands, c: StartChecks = START) -> fl
 
 
 def _misfit(times: Array, logged: Array, at: Array, asked: Array) -> float:
-    """Mean square [rad^2] by which goals logged (K, n) at times (K,) and goals asked for (M, n) at times (M,) [s] differ,
-    looked at at both of them, each held until the next."""
+    """Mean square difference [rad^2] between logged goals (K, n) at times (K,) and requested goals (M, n) at times (M,) [s],
+    evaluated at both sets of times; each goal is held until the next."""
     when = np.unique(np.concatenate([times, at])) + 1e-6
     a = logged[np.clip(np.searchsorted(times, when, side="right") - 1, 0, len(times) - 1)]
     b = asked[np.clip(np.searchsorted(at, when, side="right") - 1, 0, len(at) - 1)]
@@ -67,7 +67,7 @@ def _misfit(times: Array, logged: Array, at: Array, asked: Array) -> float:
 
 
 def ramp_problems(r: Recording, c: StartChecks = START) -> Iterator[str]:
-    """A line where all joints lag by a good part of the time between goals: the servos ramp their goals, and the log does not say
+    """A line if all joints lag by a good part of the time between goals: the servos ramp their goals, and the log does not say
     how fast."""
     if any(name.startswith("speed.") for name in r.channels):
         return
@@ -78,7 +78,7 @@ def ramp_problems(r: Recording, c: StartChecks = START) -> Iterator[str]:
         if len(changed) < 4:
             continue
         dwell = float(np.median(np.diff(log.time[changed])))
-        fit = followed(log.time, log.goal, log.position)
+        fit = fit_following(log.time, log.goal, log.position)
         if dwell < c.rows * row or fit.explained < c.follows:
             return
         shares.append(fit.lag / dwell)

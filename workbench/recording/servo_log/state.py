@@ -1,4 +1,4 @@
-"""Where a servo log's robot was at the first command."""
+"""The state of a servo log's robot at the first command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workbench.recording.recording import Recording
 from workbench.recording.white_noise import white_noise
 from workbench.types import Array
 
-_FEW_STEPS = 10  # that tell no count
+_FEW_STEPS = 10  # too few values to determine a count
 _ROUNDED = 1e-6
 """Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""
 _CERTAIN = 3.0
@@ -21,19 +21,20 @@ since a first goal that is far away brings a servo at rest to full speed within 
 
 
 def first_command(recording: Recording, starts_at: float | None = None) -> float:
-    """Time of a log's first command on its own clock [s]: as the session says, as the log says, or its first row."""
+    """Time of a log's first command on its own clock [s]: from the session, else from the log, else its first row."""
     return float(recording.metadata.get("first command", recording.time[0])) if starts_at is None else starts_at
 
 
 def resolution(values: Array) -> float:
-    """The smallest step between neighbouring values (N,): one count of what measured them; 0 where nothing changes."""
+    """The smallest step between neighbouring values (N,), one count of the sensor; 0 if nothing changes."""
     steps = np.abs(np.diff(values[np.isfinite(values)]))
     steps = steps[steps > 1e-9]
     return float(steps.min()) if len(steps) else 0.0
 
 
 def staying(values: Array) -> Array:
-    """Those of values (N,) that the next row has, too: whole counts, whatever lies between them on a log's own clock."""
+    """Those of values (N,) that repeat in the next row: whole counts, even if the log interpolates between them on a clock of its
+    own."""
     values = values[np.isfinite(values)]
     return values[:-1][np.diff(values) == 0]
 
@@ -48,13 +49,13 @@ def count_that_stays(values: Array) -> float:
 
 def count_of(values: Array, off: float = 0.02) -> float:
     """The number of which all steps between values (N,) are whole multiples, to `off` of it in the median: one count of a sensor,
-    finer than `resolution` tells of values that were rounded when written. NaN where there is none that is certain."""
+    more precise than `resolution` for values that were rounded when written. NaN if none is certain."""
     steps = np.diff(np.unique(values[np.isfinite(values)]))
     steps = steps[steps > 1e-3 * np.max(steps, initial=0.0)]
     if len(steps) < _FEW_STEPS:
         return float("nan")
     count = float(steps.min())
-    for _ in range(3):  # as the multiples say, the larger the better
+    for _ in range(3):  # from the multiples, the larger the better
         count = float(np.sum(steps) / np.sum(np.round(steps / count)))
     away = np.abs(steps / count - np.round(steps / count))
     return count if np.all(away < 5 * off) and np.median(away) < off else float("nan")

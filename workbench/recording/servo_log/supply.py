@@ -1,4 +1,4 @@
-"""Whether the recorded supply can be one that the servos ran on."""
+"""Checks whether the servos can have run on the recorded supply voltage."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SUPPLY = SupplyChecks()
 
 
 def supply_problems(r: Recording, c: SupplyChecks = SUPPLY) -> Iterator[str]:
-    """A line where the voltage is 0 throughout, or breaks down."""
+    """A line if the voltage is 0 throughout, or breaks down."""
     voltage = r.channels.get("voltage")
     if voltage is None or len(voltage) != len(r.time) or not np.isfinite(voltage).any():
         return

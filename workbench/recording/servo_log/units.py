@@ -1,6 +1,5 @@
-"""Whether the numbers of a servo log can be in the units that its format has: angles, velocities, duty, voltage, signs, zeros.
-
-Each check compares a channel with the limits of servos, with the counts of sensors, or with another channel of the joint.
+"""Checks whether the numbers of a servo log can be in its format's units: angles, velocities, duty, voltage, signs, zeros. Each
+check compares a channel with the limits of servos, with the counts of sensors, or with another channel of the joint.
 """
 
 from __future__ import annotations
@@ -45,16 +44,16 @@ class UnitChecks:
 UNITS = UnitChecks()
 _COUNTS = {name: np.deg2rad(size) for name, size in (
     ("4096 a turn", 360 / 4096), ("1024 in 300 deg", 300 / 1023), ("16384 a turn", 360 / 16384), ("1024 in 220 deg", 220 / 1023))}
-"""One count of the sensors that hobby servos have [rad]."""
+"""One count of the sensors in hobby servos [rad]."""
 _OTHER = {"radians": np.pi / 180, "degrees": 180 / np.pi, "counts of 4096 a turn": 4096 / 360}
-"""How much larger a number is in another unit, where the format has degrees or, the second alone, radians. Counts of 300/1023 deg
-are not among them: a weak servo goes over a third of its goal's way, too."""
+"""Factor by which a number is larger in another unit than in the format's: degrees or, for the second alone, radians. Counts of
+300/1023 deg are not among them: a weak servo goes over a third of its goal's way, too."""
 _RATES = {"radians a second": np.pi / 180, "turns a minute": 1 / 6, "counts of 0.229 turns a minute": 1 / (6 * 0.229),
           "counts of 0.111 turns a minute": 1 / (6 * 0.111), "degrees a second": 180 / np.pi}
 
 
 def unit_problems(r: Recording, c: UnitChecks = UNITS) -> Iterator[str]:
-    """A line for each channel that cannot be in the unit of its format, or counts from elsewhere or the other way."""
+    """A line for each channel that cannot be in its format's unit, or has another zero or sign."""
     found = {j: r.channels[f"position.{j}"] for j in r.joints if f"position.{j}" in r.channels}
     found = {j: p for j, p in found.items() if np.isfinite(p).any()}
     told = set()
@@ -86,14 +85,14 @@ def _reach(r: Recording, c: UnitChecks, joint: str, position: Array) -> Iterator
     elif asked > 2 * np.pi * c.turns:
         row = int(np.nanargmax(np.abs(goal)))  # type: ignore[arg-type]  # there is one, as asked tells
         yield (f"goal.{joint}: reaches {np.rad2deg(asked):.0f} deg at {r.time[row]:.3f} s, more than {c.turns:g} turns; is it in "
-               "another unit, or a slip?")
+               "another unit, or a typing error?")
     elif np.rad2deg(least) > c.far:
         yield (f"position.{joint}: never comes nearer than {np.rad2deg(least):.0f} deg to its servo's centre: is it in counts, "
                "or counted from another zero?")
 
 
 def _counted_in_radians(r: Recording, c: UnitChecks, joint: str, position: Array) -> Iterator[str]:
-    """Of one joint among others: its steps are those of a known sensor, in radians."""
+    """A line if one joint among others is in radians: its steps are those of a known sensor."""
     if r.units != "degrees" or len(position) < c.rows or np.rad2deg(np.nanmax(np.abs(position))) > c.radian_range:
         return
     count = count_of(np.rad2deg(position).round(6).astype(float))
@@ -106,7 +105,7 @@ def _counted_in_radians(r: Recording, c: UnitChecks, joint: str, position: Array
 
 
 def _against_goal(r: Recording, c: UnitChecks, joint: str, position: Array) -> Iterator[str]:
-    """Position and goal of one joint in different units, of different signs, or from different zeros."""
+    """A line if position and goal of one joint have different units, signs or zeros."""
     goal = r.channels.get(f"goal.{joint}")
     if goal is None or len(goal) < c.rows:
         return
@@ -144,7 +143,7 @@ def _follows(goal: Array, position: Array, most: int) -> float:
 
 
 def _all_in_radians(r: Recording, c: UnitChecks, found: dict[str, Array]) -> Iterator[str]:
-    """Of a whole log: no joint goes far, and all in finer steps than sensors have."""
+    """A line if a whole log is in radians: no joint moves far, and all move in finer steps than sensors have."""
     if r.units != "degrees" or len(r.time) < c.rows or not found:
         return
     goals = [r.channels[f"goal.{j}"] for j in r.joints if f"goal.{j}" in r.channels]
@@ -163,7 +162,7 @@ def _velocity(r: Recording, c: UnitChecks, joint: str, position: Array) -> Itera
     velocity = r.channels.get(f"velocity.{joint}")
     if velocity is None or len(r.time) < c.rows or np.rad2deg(np.ptp(position[np.isfinite(position)])) < c.goes:
         return
-    width = 5  # rows over which a count is no speed
+    width = 5  # rows over which a single count does not look like a speed
     slope = (position[width:] - position[:-width]) / (r.time[width:] - r.time[:-width])
     logged = velocity[width // 2:][:len(slope)]
     both = np.isfinite(slope) & np.isfinite(logged)
@@ -177,7 +176,7 @@ def _velocity(r: Recording, c: UnitChecks, joint: str, position: Array) -> Itera
     if unit is not None:
         yield f"velocity.{joint}: is {ratio:.3g} times the slope of position.{joint}: is it in {unit}?"
     elif alike < 0:
-        yield f"velocity.{joint}: has the other sign than the slope of position.{joint}"
+        yield f"velocity.{joint}: has the opposite sign to the slope of position.{joint}"
 
 
 def _duty(r: Recording) -> Iterator[str]:

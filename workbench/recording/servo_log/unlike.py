@@ -1,4 +1,4 @@
-"""Positions that cannot be the answer of a servo to its goals: another quantity, another take, or values that were spoilt."""
+"""Detects positions that cannot be a servo's response to its goals: another quantity, another take, or corrupted values."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.recording.servo_log.following import JointLog, followed
+from workbench.recording.servo_log.following import JointLog, fit_following
 from workbench.recording.servo_log.response import fit_response, shapes
 from workbench.recording.servo_log.state import count_of
 from workbench.types import Array
@@ -42,13 +42,13 @@ UNLIKE = UnlikeChecks()
 
 
 def unlike(log: JointLog, c: UnlikeChecks = UNLIKE) -> Iterator[str]:
-    """A line for each reason why a position cannot be a servo's answer to its goals, without the channel's name."""
+    """A line for each reason why a position cannot be a servo's response to its goals, without the channel's name."""
     asked, seen = np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))
     if len(log.time) < c.fewest or min(asked, seen) < c.goes:
         return
     yield from _noise(log, c)
     shaped = shapes(log.time, log.goal)
-    fit, late = fit_response(shaped, log.position), followed(log.time, log.goal, log.position)
+    fit, late = fit_response(shaped, log.position), fit_following(log.time, log.goal, log.position)
     if late.explained < c.follows:
         yield f"does not follow goal.{log.name}: {_instead(log, c)}"
     elif fit.explained > c.instead and (gain := min(fit.gain, late.gain)) > c.gain:
@@ -59,9 +59,9 @@ def unlike(log: JointLog, c: UnlikeChecks = UNLIKE) -> Iterator[str]:
 
 
 def none_follows(logs: Mapping[str, JointLog], c: UnlikeChecks = UNLIKE) -> str | None:
-    """A line for a log of two or more moving joints none of which follows its goals; None where one does."""
+    """A line for a log of two or more moving joints none of which follows its goals; None if one does."""
     moving = {j: log for j, log in logs.items() if np.rad2deg(min(np.ptp(log.goal), np.ptp(log.position))) >= c.goes}
-    if len(moving) < 2 or any(followed(x.time, x.goal, x.position).explained >= c.none_follow for x in moving.values()):
+    if len(moving) < 2 or any(fit_following(x.time, x.goal, x.position).explained >= c.none_follow for x in moving.values()):
         return None
     return (f"position.{', position.'.join(moving)}: no joint follows its goals: are positions and goals from two takes, from "
             "two clocks, or in another order of the joints?")
@@ -69,7 +69,7 @@ def none_follows(logs: Mapping[str, JointLog], c: UnlikeChecks = UNLIKE) -> str 
 
 def _instead(log: JointLog, c: UnlikeChecks) -> str:
     """The likely cause of a position that does not follow its goals."""
-    if followed(log.time, np.abs(log.goal), log.position).explained > c.instead:
+    if fit_following(log.time, np.abs(log.goal), log.position).explained > c.instead:
         return "it looks like the goal's absolute value: was the sign lost?"
     rate = np.gradient(log.goal, log.time)
     if fit_response(shapes(log.time, rate), log.position).explained > c.instead:
@@ -84,7 +84,7 @@ def _drift(log: JointLog, shaped: Array, c: UnlikeChecks) -> Iterator[str]:
     still, moving = (np.inf, 0.0), (np.inf, 0.0)  # mean square [deg^2] and drift [deg] of the best fit without and with a drift
     for shape in shaped[:, rows]:
         for drifts in (False, True):
-            gravity = (np.sin(shape), np.cos(shape))  # a weak servo sags by it
+            gravity = (np.sin(shape), np.cos(shape))  # a weak servo sags by as much
             basis = np.column_stack([shape, np.ones(len(rows)), *gravity, *([since] if drifts else [])])
             found = np.linalg.lstsq(basis, position, rcond=None)[0]
             square = float(np.mean((position - basis @ found) ** 2))
@@ -106,8 +106,8 @@ def _noise(log: JointLog, c: UnlikeChecks) -> Iterator[str]:
                "cable, or an estimate instead of the servo's reading?")
 
 
-def rounded(position: Array, c: UnlikeChecks = UNLIKE) -> str | None:
-    """A line where positions (N,) [rad] were rounded to more than a sensor's count; None where they were not."""
+def find_rounding(position: Array, c: UnlikeChecks = UNLIKE) -> str | None:
+    """A line if positions (N,) [rad] were rounded to more than a sensor's count; None if not."""
     count = _step(np.rad2deg(position[np.isfinite(position)]))
     if count <= c.coarse:
         return None

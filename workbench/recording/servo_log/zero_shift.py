@@ -1,4 +1,4 @@
-"""A joint's zero that shifts within a log: its readings step aside, no goal having stepped, and stay there or step back."""
+"""Detects a joint's zero that shifts within a log: its readings step although no goal did, and stay there or step back."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     if float(np.median(np.diff(log.time))) > c.slowest:
         return none, []
     steps = np.diff(log.position)
-    extra = steps[1:-1] - (steps[:-2] + steps[2:]) / 2  # beyond the mean of its neighbours, of step i + 1
+    extra = steps[1:-1] - (steps[:-2] + steps[2:]) / 2  # of step i + 1, beyond the mean of its neighbours
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     apart = np.diff(log.time) > c.pause * float(np.median(np.diff(log.time)))
     inside = [int(k) for k in large if 2 <= k < len(steps) - 2 and not apart[k - 1:k + 2].any()]
@@ -75,13 +75,14 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
 
 
 def _leaps(log: JointLog, k: int, jump: float, far: float) -> bool:
-    """Whether step `k` is larger than steps of the log are, with no row left out around it."""
+    """Whether step `k` is larger than the other steps of the log, with no row missing around it."""
     around = slice(k - 2, k + 4)
     return jump > far and bool(np.all(np.diff(log.rows[around]) == 1))
 
 
 def _stands_out(steps: Array, extra: Array, k: int, c: ShiftChecks) -> bool:
-    """Whether step `k` differs from its neighbours, which agree, by more than steps differ nearby. extra: of step i + 1."""
+    """Whether step `k` differs from its neighbours, which agree with each other, by more than nearby steps differ. extra: of step
+    i + 1."""
     jump = abs(extra[k - 1])
     if jump <= np.deg2rad(c.least) or abs(steps[k + 1] - steps[k - 1]) >= jump / 3:
         return False
@@ -98,7 +99,7 @@ def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
 
 
 def _true_level(level: Array, middle: list[float], offset: float, c: ShiftChecks) -> int:
-    """The stretch whose zero is right: that nearest to the goals, or the first where there is little between them."""
+    """The stretch whose zero is right: the one nearest to the goals, or the first if they are almost equally near."""
     distance = np.abs(np.array(middle) + offset)
     best = int(np.argmin(distance))
     spread = max(float(np.ptp(level)), 1e-9)

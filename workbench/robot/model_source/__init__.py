@@ -1,5 +1,5 @@
-"""From the file that a user has to one that Drake reads: URDF as SDF, meshes in formats that it knows, packages found; and what
-is doubtful in it."""
+"""Turns the user's file into one that Drake reads (URDF to SDF, meshes to known formats, packages located), and lists its
+doubtful values."""
 
 from workbench.robot.model_source.checks import link_sizes, model_problems
 from workbench.robot.model_source.prepare import ModelSource, prepare, user_file

@@ -37,14 +37,14 @@ CHECKS = ModelChecks()
 
 
 def drake_error(error: Exception) -> str:
-    """What Drake says, without the places in its own source and the file's path, which the caller names."""
+    """Drake's message without locations in its own source and without the file's path, which the caller names."""
     text = re.sub(r"Failure at \S+ in \w+\(\): ", "", str(error))
     text = re.sub(r"(?:^|\s)/?\S*?:(\d+): error: ", r" line \1: ", text)
     return " ".join(text.split())[:600]
 
 
 class _Errors(logging.Handler):
-    """Keeps what Drake logs as errors: values that its parser leaves out, without any exception."""
+    """Collects what Drake logs as errors: values that its parser ignores without raising."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -71,7 +71,7 @@ def quiet_drake() -> Iterator[None]:
         raise RuntimeError(errors.found[0])
 
 
-def _built(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
+def _build(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
     """Plant, scene graph and model instances that Drake makes of `path`; InputError names `source` where it makes none."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
@@ -96,7 +96,7 @@ def _built(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
 def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
     """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
     none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either."""
-    plant, scene_graph, instances = _built(path, source)
+    plant, scene_graph, instances = _build(path, source)
     if len(instances) != 1:
         return ()
     bodies = [plant.get_body(b) for b in plant.GetBodyIndices(instances[0])]
@@ -110,7 +110,7 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
 def link_sizes(path: Path) -> dict[str, float]:
     """By link, the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones [m], at
     least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
-    plant, scene_graph, instances = _built(path, path)
+    plant, scene_graph, instances = _build(path, path)
     bodies = [plant.get_body(b) for instance in instances for b in plant.GetBodyIndices(instance)]
     out = {}
     for body in bodies:

@@ -1,4 +1,4 @@
-"""Meshes of a description: where their files are, and in a format that Drake reads."""
+"""Locates the meshes of a description, and converts them to a format that Drake reads."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from workbench.files.reading import regular_file, write_whole
 from workbench.files.resources import resource_dir
 
 READ = (".obj", ".gltf", ".glb", ".vtk")
-"""By Drake as they are."""
+"""Formats that Drake reads directly."""
 CONVERTED = (".stl", ".dae", ".ply", ".off", ".3mf")
-"""By trimesh into OBJ."""
+"""Formats that trimesh converts to OBJ."""
 _UP = 6
-"""Folders above the model's in which a package is looked for."""
+"""Number of folders above the model's that are searched for a package."""
 _MOST = 256 << 20  # of one mesh [bytes]
 
 

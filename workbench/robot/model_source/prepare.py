@@ -1,4 +1,4 @@
-"""The description that Drake reads, of the one that the user has."""
+"""Prepares the user's description for Drake."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from workbench.robot.model_source.xml_file import check_includes, check_numbers,
 NAME = "drake-workbench"
 """Folder of the user's cache, one for all that the workbench keeps."""
 _NAMES: dict[str, str] = {}
-"""The user's file by the one that was made of it, for errors to name."""
+"""The user's file by the file made from it, so that errors can name it."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A robot description as an XML tree, read so that nothing in it can run away: sizes bounded, no entities, no circle of files."""
+"""Reads a robot description as an XML tree, safely: bounded sizes, no entities, no circular includes."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _ATTRIBUTES = {"mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz"
 _COUNTS = {"rpy": (3,), "rgba": (4,), "friction": (1,)}
 _LARGEST, _SMALLEST = 1e12, 1e-300
 _ENDLESS = {"lower", "upper", "effort", "velocity"}
-"""Which may be infinite."""
+"""Those that may be infinite."""
 
 _CONVERTED = {
     "mujoco": ", a MuJoCo model (MJCF): most publish the URDF that it was made of; else convert it with mjcf2urdf or Drake's "
               "Parser and write SDF",
     "COLLADA": ", a mesh (COLLADA): name the robot's URDF or SDF, which names its meshes",
     "launch": ", a launch file of ROS: name the robot description that it loads"}
-"""What to do about models of other kinds, by their root element."""
+"""Remedies for models of other kinds, by root element."""
 
 
 def read_xml(path: Path) -> Element:
@@ -81,7 +81,7 @@ def _bound_prefix(content: bytes) -> bytes:
 
 
 def check_includes(path: Path, root: Element, seen: tuple[Path, ...] = ()) -> None:
-    """InputError where a file includes itself, by whatever way."""
+    """InputError if a file includes itself, directly or indirectly."""
     seen = (*seen, path.resolve())
     for include in root.iter("include"):
         uri = (include.findtext("uri") or "").strip()

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.effects.apply import apply_to_commands, resolved
+from workbench.effects.apply import apply_to_commands, resolve
 from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
@@ -18,7 +18,7 @@ from workbench.simulation.compiled.station import CompiledJob
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import BaseState
-from workbench.simulation.stepped import followed
+from workbench.simulation.stepped import switch_commands
 from workbench.types import Array
 
 LOOK_BACK = 2.0
@@ -39,7 +39,7 @@ class CompiledSteppedRun:
         self._sent: Commands | None = None
         self._played: Commands | None = None
         self._pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        retiming = [effect for effect, _, _ in resolved(model) if type(effect).commands is not Effect.commands]
+        retiming = [effect for effect, _, _ in resolve(model) if type(effect).commands is not Effect.commands]
         self._only_delayed = all(effect.like_a_late_start for effect in retiming)
 
     def branch(self) -> CompiledSteppedRun:
@@ -54,7 +54,7 @@ class CompiledSteppedRun:
 
     def send(self, commands: Commands) -> None:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
-        self._sent = followed(self._sent, commands.reordered(self.model.joints), self.time)
+        self._sent = switch_commands(self._sent, commands.reordered(self.model.joints), self.time)
         self._played = apply_to_commands(self._recent(self._sent), self.model)
 
     def advance(self, seconds: float) -> None:

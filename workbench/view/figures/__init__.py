@@ -1,4 +1,4 @@
-"""Every figure of the workbench. Each takes plain takes and arrays and gives a matplotlib Figure; none touches pyplot."""
+"""Every figure of the workbench. Each takes plain takes and arrays and returns a matplotlib Figure; none uses pyplot."""
 
 from workbench.view.figures.body import body_attitude, body_path, footfalls
 from workbench.view.figures.errors import joint_errors

@@ -1,4 +1,4 @@
-"""Where the body went, how it was held, which foot stood when."""
+"""The path and attitude of the body, and when each foot was on the ground."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from workbench.compare.metrics import heading, travelled, turned
+from workbench.compare.metrics import displacement, heading, heading_change
 from workbench.recording.take import Take
 from workbench.types import Array
 from workbench.view.figures.stance import Stance
-from workbench.view.figures.style import OTHERS, RECORDED, SIMULATED, legend_above, new_figure, styled
+from workbench.view.figures.style import OTHERS, RECORDED, SIMULATED, in_house_style, legend_above, new_figure
 from workbench.view.playback import names_of, since_start
 
 
 @dataclass(frozen=True)
 class _Body:
-    """Path (N, 3) [cm] and heading, roll, pitch (N,) [deg], all from where the body stood at rest; time (N,) [s]."""
+    """Path (N, 3) [cm] and heading, roll, pitch (N,) [deg], all relative to the body at rest; time (N,) [s]."""
 
     time: Array
     path: Array
@@ -31,7 +31,7 @@ class _Body:
     turn: float
 
 
-@styled
+@in_house_style
 def body_path(simulated: Take, recorded: Take | None = None, others: Mapping[str, Take] | None = None) -> Figure:
     """Path of the base link in the plane, seen from above (x forward to the right, y left upwards), and its heading.
 
@@ -54,7 +54,7 @@ def body_path(simulated: Take, recorded: Take | None = None, others: Mapping[str
     plane.set_aspect("equal", adjustable="datalim")
     plane.set_xlabel("forward [cm]")
     plane.set_ylabel("left [cm]")
-    plane.set_title("path of the base, a tick a second")
+    plane.set_title("path of the base, one tick per second")
     over_time.set_xlabel("time since the first command [s]")
     over_time.set_ylabel("heading, positive to the left [deg]")
     over_time.set_title("heading")
@@ -62,9 +62,9 @@ def body_path(simulated: Take, recorded: Take | None = None, others: Mapping[str
     return figure
 
 
-@styled
+@in_house_style
 def body_attitude(simulated: Take, recorded: Take | None = None, others: Mapping[str, Take] | None = None) -> Figure:
-    """Height, roll (left side up) and pitch (nose down positive) of the base link over time, from where it stood."""
+    """Height, roll (left side up) and pitch (nose down positive) of the base link over time, relative to rest."""
     figure = new_figure(10, 6)
     rows = figure.subplots(3, 1, sharex=True)
     for label, take, colour, width in _runs(simulated, recorded, others):
@@ -76,21 +76,21 @@ def body_attitude(simulated: Take, recorded: Take | None = None, others: Mapping
     for axes, label in zip(rows, ("height [mm]", "roll [deg]", "pitch [deg]")):
         axes.axhline(0, color="#999999", linewidth=0.8, zorder=1)
         axes.set_ylabel(label)
-    rows[0].set_title("attitude of the base, from where it stood")
+    rows[0].set_title("attitude of the base, relative to rest")
     legend_above(rows[0])
     rows[-1].set_xlabel("time since the first command [s]")
     rows[-1].margins(x=0)
     return figure
 
 
-@styled
+@in_house_style
 def footfalls(
     simulated: Stance, recorded: Stance | None = None, *, span: tuple[float, float], unseen: Stance | None = None,
 ) -> Figure:
-    """A bar while a foot stands, simulated under measured, and each foot's duty factor.
+    """A bar while a foot is on the ground, simulated below measured, and each foot's duty factor.
 
-    span: [s since the first command]. unseen: intervals in which the recording did not see a foot; hatched, and left out
-    of its duty factor.
+    span: [s since the first command]. unseen: intervals in which the recording did not see a foot; hatched, and excluded from its
+    duty factor.
     """
     feet = list(simulated)
     figure = new_figure(10, 0.55 * len(feet) + 1.5)
@@ -151,10 +151,10 @@ def _body(take: Take) -> _Body | None:
     tilt = np.stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), -np.arcsin(R[:, 2, 0].clip(-1, 1))], axis=1)  # roll, pitch
     turn = heading(take.quat_WB)
     roll, pitch = np.degrees(tilt - np.nanmean(tilt[rest], axis=0)).T
-    moved = travelled(take.p_WB, time)
+    moved = displacement(take.p_WB, time)
     return _Body(
         time=time, path=100 * (take.p_WB - take.p_WB[rest].mean(axis=0)), heading=np.degrees(turn - np.nanmean(turn[rest])),
-        roll=roll, pitch=pitch, forward=100 * float(moved[0]), turn=float(np.degrees(turned(take.quat_WB, time))))
+        roll=roll, pitch=pitch, forward=100 * float(moved[0]), turn=float(np.degrees(heading_change(take.quat_WB, time))))
 
 
 def _whole_seconds(axes: Axes, body: _Body, colour: str) -> None:

@@ -1,4 +1,4 @@
-"""A driven path: way-points, the way walked, and the turn of each cycle."""
+"""A driven path: way-points, the path walked, and the turn of each cycle."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from matplotlib.patches import Circle
 
 from workbench.gait.drive.loop import Driven
 from workbench.gait.drive.plan import Disc
-from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, in_house_style, legend_above, new_figure
 
 
-@styled
+@in_house_style
 def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[Disc] = ()) -> Figure:
     """Seen from above, x forward to the right, y left upwards [m]: the path, the way-points, the steered robot and, if given, the
     same robot with the straight gait; discs to walk around."""
@@ -33,15 +33,16 @@ def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[
     return figure
 
 
-@styled
+@in_house_style
 def driven_cycles(closed: Driven, most: float) -> Figure:
-    """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, and the estimated
-    turning bias [deg per cycle]. most: largest turn [rad per stance]."""
-    figure = new_figure(9, 8.0)
-    rows = figure.subplots(4, 1, sharex=True)
+    """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, sideways stride
+    [mm per stance], and the estimated turning bias [deg per cycle]. most: largest turn [rad per stance]."""
+    figure = new_figure(9, 9.5)
+    rows = figure.subplots(5, 1, sharex=True)
     cycles = np.arange(len(closed.turns))
-    for axes, values, label in zip(rows, (100 * closed.left, np.rad2deg(closed.off), closed.turns, np.rad2deg(closed.bias)),
-                                   ("left [cm]", "heading [deg]", "turn [rad]", "bias [deg/cycle]")):
+    columns = {"left [cm]": 100 * closed.left, "heading [deg]": np.rad2deg(closed.off), "turn [rad]": closed.turns,
+               "side [mm]": 1000 * closed.sides, "bias [deg/cycle]": np.rad2deg(closed.bias)}
+    for axes, (label, values) in zip(rows, columns.items()):
         axes.axhline(0, color="#999999", linewidth=0.8)
         axes.plot(cycles, values, ".-", color=ACCENT if label.startswith("bias") else SIMULATED)
         axes.set_ylabel(label)

@@ -1,4 +1,4 @@
-"""How far apart, and how much of that is noise or numerics."""
+"""Errors, and how much of them is noise or numerical error."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workbench.compare.results import Channel, by_error
-from workbench.view.figures.style import COMMAND, ERROR, FLOOR, NOISE, RECORDED, SIMULATED, new_figure, styled
+from workbench.identify.options import PROBLEM
+from workbench.view.figures.style import COMMAND, ERROR, FLOOR, NOISE, RECORDED, SIMULATED, in_house_style, new_figure
 
-LIMIT = 1.3
+LIMIT = PROBLEM.gap_ratio
 """An error within this many times the root of noise² + floor² is explained (docs/formats.md, section 6)."""
 
 
-@styled
+@in_house_style
 def joint_errors(channels: Mapping[str, Channel]) -> Figure:
-    """RMS error of each joint, the largest over noise first, against what noise and numerics alone would make.
+    """RMS error of each joint, the largest over noise first, compared with the error that noise and numerics alone would cause.
 
-    channels: joint -> error, noise, floor, spread [rad], shown in degrees. A bar beyond `LIMIT` times the
-    root of noise² + floor² is orange: there is something left to explain.
+    channels: joint -> error, noise, floor, spread [rad], shown in degrees. A bar beyond `LIMIT` times the root of noise² + floor²
+    is orange: noise and numerics do not explain it.
     """
     order = by_error(channels, {joint: channel.over_noise for joint, channel in channels.items()})
     figure = new_figure(9, 0.34 * len(order) + 2.1)

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
-from workbench.view.figures.style import styled
+from workbench.view.figures.style import in_house_style
 
 LARGEST_SVG = 200_000
-"""From here on [bytes] curves are kept only where they still take less room than pixels."""
+"""A larger figure [bytes] is kept as SVG only if the PNG would be larger still."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class EncodedFigure:
     content: bytes
 
 
-@styled
+@in_house_style
 def encode(figure: Figure) -> EncodedFigure:
-    """SVG, or PNG where the SVG would be large and larger. The same figure gives the same bytes."""
+    """SVG, or PNG if the SVG is large and the PNG smaller. The same figure gives the same bytes."""
     _settle(figure)
     svg = EncodedFigure("image/svg+xml", _print_figure(figure, "svg"))
     if len(svg.content) <= LARGEST_SVG:
@@ -35,9 +35,9 @@ def encode(figure: Figure) -> EncodedFigure:
     return min(svg, png, key=lambda encoded: len(encoded.content))
 
 
-@styled
+@in_house_style
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Writes .svg, .png or .pdf, whole or not at all; InputError for another ending or where it cannot be written."""
+    """Writes .svg, .png or .pdf atomically; InputError for another ending, or if the file cannot be written."""
     path = Path(path)
     kind = path.suffix.removeprefix(".").lower()
     if kind not in ("svg", "png", "pdf"):

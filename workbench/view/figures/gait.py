@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from workbench.gait.certificate import Certificate
 from workbench.gait.limits import each
-from workbench.view.figures.style import ACCENT, COMMAND, FLOOR, RECORDED, SIMULATED, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, FLOOR, RECORDED, SIMULATED, in_house_style, new_figure
 
 
-@styled
+@in_house_style
 def limit_bars(certificate: Certificate) -> Figure:
-    """Each limit's worst use: value by limit, broken beyond one; advice is hatched."""
+    """The worst use of each limit, as value over limit: above 1 the limit is exceeded. Recommendations are hatched."""
     rows = sorted(each(certificate.margins), key=lambda item: item[1].use)
     figure = new_figure(10, 0.42 * len(rows) + 1.2)
     axes = figure.add_subplot()
@@ -28,7 +28,7 @@ def limit_bars(certificate: Certificate) -> Figure:
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.axvline(1.0, color=RECORDED, linewidth=1.4)
     axes.set_xlim(0, max(1.9, max(min(m.use, 2.6) for _, m in rows) + 0.9))
-    axes.set_xlabel("value by limit")
+    axes.set_xlabel("value over limit")
     axes.grid(axis="y", visible=False)
     return figure
 
@@ -38,10 +38,10 @@ def short(value: float) -> str:
     return "0" if abs(value) < 1e-3 else f"{value:.3g}"
 
 
-@styled
+@in_house_style
 def draw_ranges(certificate: Certificate) -> Figure:
-    """Of each quantity: lowest, 5 %, median, 95 % and highest over the ensemble, and the nominal robot's. Of few draws there are
-    no percentiles."""
+    """Lowest, 5 %, median, 95 % and highest value of each quantity over the ensemble, and the nominal robot's. With few draws
+    there are no percentiles."""
     told = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k not in ("quantiles", "incidents")]
     rows = [(k, v) for k, v in told if all(v[i] is not None and math.isfinite(v[i]) for i in (0, 2, 4))]
     nominal = _nominal(certificate)

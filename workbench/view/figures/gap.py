@@ -15,7 +15,17 @@ from workbench.types import Array
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.heat import BIN, DARKEST, HEAT, SCALE, cells
 from workbench.view.figures.stance import intervals
-from workbench.view.figures.style import ACCENT, COMMAND, NOISE, RECORDED, SIMULATED, STANCE, legend_above, new_figure, styled
+from workbench.view.figures.style import (
+    ACCENT,
+    COMMAND,
+    NOISE,
+    RECORDED,
+    SIMULATED,
+    STANCE,
+    in_house_style,
+    legend_above,
+    new_figure,
+)
 from workbench.view.shapes import robot_shapes
 
 SHOWN = 3.0
@@ -23,7 +33,7 @@ SHOWN = 3.0
 _DEGREES = 180 / np.pi
 
 
-@styled
+@in_house_style
 def gap_map(take: TakeReport) -> Figure:
     """Places over time: residual over noise and numerical error, RMS in cells of BIN, before and (if it differs) after.
 
@@ -50,7 +60,7 @@ def gap_map(take: TakeReport) -> Figure:
     return figure
 
 
-@styled
+@in_house_style
 def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     """The robot in neutral, drawn obliquely, each joint coloured and sized by its error over noise and numerics."""
     k, shapes = model.kinematics, robot_shapes(model)
@@ -84,7 +94,7 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
         axes.annotate(f"{joint} {ratios[joint]:.1f}×", points[joint], xytext=(right + 2 * line, top - row * line),
                       va="center", fontsize=12, fontweight="bold", color=RECORDED, zorder=4,
                       arrowprops={"arrowstyle": "-", "color": RECORDED, "linewidth": 1.0, "alpha": 0.6})
-    axes.update_datalim([(right + 4 * line, top)])  # room for what is written there
+    axes.update_datalim([(right + 4 * line, top)])  # room for the labels
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
     axes.set_axis_off()
@@ -97,7 +107,7 @@ def _oblique(p: Array) -> tuple[float, float]:
     return float(p[0] - 0.55 * p[1]), float(p[2] + 0.5 * p[1])
 
 
-@styled
+@in_house_style
 def before_after(take: TakeReport, joint: str) -> Figure:
     """A joint as recorded, and by the nominal and the fitted model, with the residuals of each, around the held-out stretch on
     which the nominal model is worst."""
@@ -110,7 +120,7 @@ def before_after(take: TakeReport, joint: str) -> Figure:
     top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
     sigma = _DEGREES * take.sigma(joint)
     column = take.channels.index(joint)
-    # as they were judged, each from its own first command where the recording leaves that open
+    # as they were evaluated: each model from its own first command if the recording does not show when that came
     for what, residual, colour, style in (("nominal", take.before, COMMAND, "--"), ("fitted", take.after, SIMULATED, "-")):
         left = sigma * residual[use, column]
         top.plot(t[use], recorded - left, color=colour, linestyle=style, linewidth=1.6, label=what)
@@ -146,9 +156,9 @@ def _worst_stretch(take: TakeReport, joint: str) -> tuple[float, float]:
     return start, start + width
 
 
-@styled
+@in_house_style
 def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
-    """Each channel's error on frames that nothing saw, over what noise and numerics alone make, before and after, by take."""
+    """Each channel's error on held-out frames, over the error that noise and numerics alone cause, before and after, by take."""
     ratios = [(s.ratios(s.before), s.ratios(s.after)) for s in takes]
     worst = {c: max(float(np.nan_to_num(before.get(c, 0.0))) for before, _ in ratios) for s in takes for c in s.channels}
     order = sorted(worst, key=lambda c: -worst[c])

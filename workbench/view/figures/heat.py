@@ -1,4 +1,4 @@
-"""How far a recording leaves a model, as a colour: one scale for the map over time, the robot's picture and the replay."""
+"""How far a recording deviates from a model, as a colour: one scale for the map over time, the robot's picture and the replay."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from workbench.view.figures.style import RECORDED
 BIN = 0.1
 """Width of a cell [s]."""
 DARKEST = 30.0
-"""Error over noise from which on it gets no darker."""
+"""Error over noise at which the scale is darkest."""
 HEAT = LinearSegmentedColormap.from_list("gap", ["#F4F7F5", "#FCE3C5", "#F2A65A", RECORDED, "#7A2E00"]
                                          ).with_extremes(bad="#D9D9DD")
 """Grey where nothing was seen."""

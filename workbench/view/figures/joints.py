@@ -21,10 +21,10 @@ from workbench.view.figures.style import (
     RECORDED,
     SIMULATED,
     STANCE,
+    in_house_style,
     legend_above,
     new_figure,
     panels,
-    styled,
 )
 from workbench.view.playback import names_of, since_start
 
@@ -32,7 +32,7 @@ LEAST_SPAN = 4.0
 """Of an angle's axis [deg]."""
 
 
-@styled
+@in_house_style
 def joint_overlay(
     joint: str, simulated: Take, recorded: Take | None = None, *, noise: float | None = None, floor: float | None = None,
     stance: Stance | None = None, span: tuple[float, float] | None = None,
@@ -66,7 +66,7 @@ def joint_overlay(
     return figure
 
 
-@styled
+@in_house_style
 def joint_grid(
     simulated: Take, recorded: Take | None = None, *, noise: Mapping[str, float] | None = None,
     joints: Sequence[str] | None = None, stance: Stance | None = None, span: tuple[float, float] | None = None,
@@ -100,7 +100,7 @@ def joint_grid(
     return figure
 
 
-@styled
+@in_house_style
 def phase_portrait(joint: str, simulated: Take, recorded: Take | None = None) -> Figure:
     """Velocity over position of one joint after the first command: lag, friction and play show as a change of shape."""
     simulated = _zeroed_like(simulated, recorded)

@@ -1,4 +1,4 @@
-"""A planned gait beside what its table does, over one cycle."""
+"""A planned gait and the simulated motion of its table, over one cycle."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from workbench.gait.plan_compare import PlanComparison
-from workbench.view.figures.style import COMMAND, SIMULATED, new_figure, styled
+from workbench.view.figures.style import COMMAND, SIMULATED, in_house_style, new_figure
 
 
-@styled
+@in_house_style
 def plan_and_run(c: PlanComparison) -> Figure:
     """Height and tilt of the base, and each foot's height: planned (grey) and simulated, the mean of the cycles."""
     figure = new_figure(10, 6.5)

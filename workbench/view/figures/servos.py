@@ -13,13 +13,13 @@ from workbench.compare.metrics import rms
 from workbench.robot.model import RobotModel
 from workbench.servo import ServoLaw
 from workbench.types import Array
-from workbench.view.figures.style import ACCENT, NOISE, OTHERS, RECORDED, SIMULATED, STANCE, new_figure, panels, styled
+from workbench.view.figures.style import ACCENT, NOISE, OTHERS, RECORDED, SIMULATED, STANCE, in_house_style, new_figure, panels
 
 _PARTS = {"t": ("top joints", OTHERS[2]), "m": ("middle joints", SIMULATED), "b": ("bottom joints", ACCENT),
           "": ("other joints", OTHERS[0])}
 
 
-@styled
+@in_house_style
 def joint_torques(
     time: Array, joints: Sequence[str], torques: Mapping[str, Array], *, limit: Mapping[str, float] | None = None,
 ) -> Figure:
@@ -43,7 +43,7 @@ def joint_torques(
     return figure
 
 
-@styled
+@in_house_style
 def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array, v: Array) -> Figure:
     """The load of each servo. Left: motor torque over joint speed of each sample, inside the servo's limits at its supply
     voltage. Right: the largest share of its torque that each joint uses, and of the no-load speed.
@@ -85,18 +85,18 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
     bars.invert_yaxis()
     bars.grid(False, axis="y")
     bars.set_xlabel("largest share of the servo's limit [%]")
-    figure.legend(*_joined(plane, bars), loc="outside lower center", ncols=4)
+    figure.legend(*_merge_legends(plane, bars), loc="outside lower center", ncols=4)
     return figure
 
 
-@styled
+@in_house_style
 def base_wrench(
     time: Array, residual: Array, sigma: Array | None = None, *, weight: float | None = None,
 ) -> Figure:
-    """The wrench on the base that the motion needs and no contact inside the friction cone supplies.
+    """The wrench on the base that the motion requires and that no contact inside the friction cone can supply.
 
-    time: (N,) [s] on the take's clock. residual: (N, 6) [moment about the base's origin N m, force N] in the world.
-    sigma: (N, 6), its standard deviation from the measurement's noise, drawn as ±2σ. weight: of the robot [N], for scale.
+    time: (N,) [s] on the take's clock. residual: (N, 6) [moment about the base's origin N m, force N] in the world. sigma: (N,
+    6), its standard deviation from the measurement's noise, drawn as ±2σ. weight: of the robot [N], for scale.
     """
     figure = new_figure(10, 5.4)
     rows = figure.subplots(2, 1, sharex=True)
@@ -133,7 +133,7 @@ def _part(joint: str) -> str:
     return joint[-1] if len(joint) == 3 and joint[0] in "fb" and joint[1] in "lr" and joint[-1] in "tmb" else ""
 
 
-def _joined(*all_axes: Axes) -> tuple[list[Any], list[str]]:
+def _merge_legends(*all_axes: Axes) -> tuple[list[Any], list[str]]:
     found: dict[str, Any] = {}
     for axes in all_axes:
         handles, labels = axes.get_legend_handles_labels()

@@ -1,4 +1,4 @@
-"""When each foot stands, as intervals that figures of takes on different clocks can share."""
+"""When each foot is on the ground, as intervals that figures of takes on different clocks can share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Stance = Mapping[str, Array]
 
 
 def stance_of(phases: Mapping[str, FootPhases], take: Take) -> dict[str, Array]:
-    """Stance of every foot, from how `foot_phases` or `force_phases` found it on this take's frames."""
+    """Stance of every foot, from what `foot_phases` or `force_phases` found on this take's frames."""
     clock = since_start(take)
     return {foot: intervals(clock, phase.stance) for foot, phase in phases.items()}
 
@@ -37,5 +37,5 @@ def intervals(time: Array, on: NDArray[np.bool_]) -> Array:
 
 
 def by_joint(stance: Stance, model: RobotModel) -> dict[str, Array]:
-    """Joint -> when the foot of its leg stands, of the joints that move one foot alone."""
+    """Joint -> stance of its leg's foot, for the joints that move only one foot."""
     return {joint: stance[foot] for foot, joints in legs(model).items() if foot in stance for joint in joints}

@@ -1,4 +1,4 @@
-"""The robot as a stick figure, instant after instant: the replay for paper."""
+"""The robot as a row of stick figures: the replay in print."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.recording.take import Take
 from workbench.robot.feet import tips
 from workbench.robot.model import RobotModel
 from workbench.types import Array
-from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
+from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, in_house_style, new_figure
 from workbench.view.playback import Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 
@@ -19,12 +19,12 @@ WIDEST = 2.5
 """Limit of the pictured distance, relative to that of the simulated robot."""
 
 
-@styled
+@in_house_style
 def film_strip(
     model: RobotModel, simulated: Take, recorded: Take | None = None, *, instants: int = 6,
 ) -> Figure:
-    """Side view from the right at `instants` even times from the first command on; the recorded robot is laid
-    over the simulated one where both stood; where it is out of the picture, how far. Far legs are thinner."""
+    """Side view from the right at `instants` evenly spaced times from the first command on. The recorded robot is aligned with
+    the simulated one at rest; if it leaves the picture, its distance is printed. Far legs are thinner."""
     takes = [simulated] if recorded is None else [simulated, recorded]
     first, last = common_span(takes, lead=0.0)
     time = np.concatenate([[first - 0.1], np.linspace(first, last, instants)])  # the first stands for the rest
@@ -60,7 +60,7 @@ def film_strip(
 
 
 def _say_how_far(axes: Axes, off: float, reach: float, colour: str) -> None:
-    """Of a robot `off` [cm] the middle of a picture that reaches so far [cm], where it is beyond that."""
+    """Prints the distance of a robot `off` [cm] from the middle of a picture that extends to `reach` [cm], if it lies outside."""
     if abs(off) > reach:
         x, align, said = (0.02, "left", f"\u2190 {-off:.0f} cm") if off < 0 else (0.98, "right", f"{off:.0f} cm \u2192")
         axes.text(x, 0.5, said, transform=axes.transAxes, ha=align, va="center", color=colour, fontsize=10)
@@ -74,7 +74,7 @@ def _heights(film: Playback, ends: dict[str, tuple[str, Array]]) -> tuple[float,
 
 
 def _farthest(film: Playback, feet: dict[str, tuple[str, Array]], played: Playback) -> float:
-    """How far ahead of or behind the base that the pictures are centred on a joint or foot ever is [m]."""
+    """The largest distance [m] of a joint or foot ahead of or behind the base on which the pictures are centred."""
     places = [film.in_world(link) for link in film.links]
     tips = [(film.in_world(link), tip) for link, tip in feet.values()]
     x = [p[:, 0] for p, _ in places] + [(p + R @ tip)[:, 0] for (p, R), tip in tips]

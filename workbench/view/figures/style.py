@@ -64,8 +64,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Runs a function in the house style and leaves matplotlib's settings as they were."""
+def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
+    """Runs a function in the house style and restores matplotlib's settings."""
 
     @functools.wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -83,7 +83,7 @@ def new_figure(width: float = 9.0, height: float = 4.5) -> Figure:
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Parts 0 to 1 of '#RRGGBB'."""
+    """Red, green and blue, 0 to 1, of '#RRGGBB'."""
     return int(colour[1:3], 16) / 255, int(colour[3:5], 16) / 255, int(colour[5:7], 16) / 255
 
 

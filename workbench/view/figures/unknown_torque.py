@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.robot.torque_table import UNITS
-from workbench.view.figures.style import NOISE, SIMULATED, new_figure, styled
+from workbench.view.figures.style import NOISE, SIMULATED, in_house_style, new_figure
 
 _LABELS = {"angle": "angle", "angle and direction": "angle, times the direction of motion", "duty": "duty",
            "duty and direction": "size of the duty, times the direction of motion", "speed": "speed"}
@@ -15,7 +15,7 @@ _NORMAL90 = 1.645
 """Standard deviations on either side of the middle that hold 90 %."""
 
 
-@styled
+@in_house_style
 def unknown_torque(unknown: UnknownTorque) -> Figure:
     """Each table with its 90 % band."""
     figure = new_figure(12, 3.4)

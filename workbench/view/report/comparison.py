@@ -29,7 +29,7 @@ from workbench.view.report.page import Details, Part, Picture, Provenance, Repla
 from workbench.view.scene.replay import write_replay
 
 SHOWN = 3
-"""Joints drawn large, if they differ by more than LIMIT; the others are folded away."""
+"""Most joints drawn large; only those that differ by more than LIMIT are. The others are folded away."""
 
 
 def write_comparison(comparison: Comparison, model: RobotModel, folder: Path, title: str,
@@ -54,7 +54,7 @@ def headline(comparison: Comparison) -> str:
     """The page's first sentence: which joints differ by more than noise and numerical error."""
     over = [(t, j, c) for t in comparison.takes for j, c in t.joints.items() if c.over_noise > LIMIT]
     if not over:
-        return f"Every joint's error is within {LIMIT:g} times what noise and numerics make."
+        return f"Every joint's error is within {LIMIT:g} times noise and numerical error."
     take, joint, worst = max(over, key=lambda found: found[2].over_noise)
     joints = len({j for _, j, _ in over})
     return (f"{_count(joints, 'joint')} differ{'s' if joints == 1 else ''} by more than noise and numerical error; the worst is "
@@ -90,7 +90,7 @@ def _provenance(comparison: Comparison, model: RobotModel) -> Provenance:
 
 
 def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Section:
-    """All there is to see of one take; its 3D replay is written to `replay` and shown."""
+    """Everything about one take, including its 3D replay, which is written to `replay`."""
     write_replay(replay, model, take.simulated, take.recorded, title=take.name)
     parts: list[Part] = [Picture(joint_errors(take.joints),
                                  "Error of each joint, with the error that noise and numerics alone would cause.")]
@@ -107,7 +107,7 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         parts.append(Picture(figure, _about(joint, c)))
     if take.joints:
         parts.append(Curves(take.simulated, take.recorded, take.joints_by_error(),
-                            "The joints one by one, the one with the largest error first; zero is the first command."))
+                            "Joints in order of error, largest first; time zero is the first command."))
     noise = {j: c.noise for j, c in take.joints.items()}
     parts.append(Details("All joints", [
         Picture(joint_grid(take.simulated, take.recorded, noise=noise, joints=sorted(take.joints),

@@ -15,7 +15,7 @@ from workbench.types import Array
 from workbench.view.playback import since_start
 
 _ROWS = 1500
-"""Most rows of a take that are drawn; of longer ones, every second or third."""
+"""Maximum number of rows drawn per take; longer takes are thinned."""
 
 
 @dataclass(frozen=True)

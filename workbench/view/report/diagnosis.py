@@ -28,9 +28,9 @@ from workbench.view.report.words import (
     in_words,
     interval,
     is_error,
+    join_words,
     layers_of,
     left_row,
-    listed,
     next_said,
     probable,
     quantity,
@@ -42,7 +42,7 @@ from workbench.view.report.words import (
 )
 
 PATH = 0.03
-"""A body that moved less far than this did not go anywhere [m]."""
+"""A body that moved less than this [m] did not walk."""
 
 
 def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: Path, title: str,
@@ -96,7 +96,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
             *(u.evidence for u in diagnosis.unknown_torques)]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
-        what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that "
+        what.append(f"Evaluated on stretches of {join_words([s.name for s in takes])} ({seconds:.0f} s in all) that "
                     "were held out from the choice of effects and from every fit. **1×** is the error that measurement noise, "
                     "numerics and the choice of contact model cause alone.")
     if any(c in BODY for s in takes for c in s.channels):
@@ -105,22 +105,24 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
             f"{PROBLEM.window:g} s; paths and 3D show it without these resets."
         )
     if seen := diagnosis.provenance.get("searched"):
-        what.append(f"The search used the {sum(seen.values()):.0f} s of these with the largest errors ({listed(list(seen))}).")
+        what.append(f"The search used the {sum(seen.values()):.0f} s of these with the largest errors "
+                    f"({join_words(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     what += [f"Log {name}: {note}." for name, notes in diagnosis.provenance.get("logs", {}).items() for note in notes
              if "stamped" in note]
     what += said_aside(diagnosis.provenance)
     what += hidden_effects(diagnosis.provenance.get("cannot_show", {}))
     if why := diagnosis.provenance.get("engine", {}).get("because"):
-        what.append(f"All rollouts are Drake's, as {why}.")
+        what.append(f"All rollouts were computed by Drake, because {why}.")
     if diagnosis.stopped:
         what.append("The search stopped at its work limit, so some residuals were not examined.")
     return " ".join(what)
 
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
-    numbers = [(f"gravity over torque at {listed(t.where)}", f"{t.ratio.value:.2f}×",
-                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}") for t in diagnosis.tied]
+    numbers = [(f"gravity over torque at {join_words(t.where)}", f"{t.ratio.value:.2f}×",
+                f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}"
+                + (", alone or together" if t.may_be_several else "")) for t in diagnosis.tied]
     for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
         sure = f"{probable(f.together)} sure" + (
@@ -136,7 +138,7 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
 
 
 def _is_bounded(e: Estimate) -> bool:
-    """Whether the data say anything of it."""
+    """Whether the data constrain it."""
     return bool(np.isfinite([e.low, e.high]).any())
 
 
@@ -154,7 +156,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
         over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
         named = over if len(over) < 6 else [*over[:4], f"{len(over) - 4} more places"]
         if over and diagnosis.verdict != "no_gap":
-            said = f"The recordings differ from the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
+            said = f"The recordings differ from the nominal model at {join_words(named)}. {layers_of(diagnosis)}".strip()
         else:
             said = "The recordings do not differ from the nominal model by more than chance" + (
                 "; the table shows the closest candidates." if diagnosis.gap else ".")
@@ -193,9 +195,10 @@ def _gap_row(g: GapEntry) -> list[str]:
 
 def _unseen(takes: Sequence[TakeReport]) -> Section:
     over = {s.name: [c for c, r in s.ratios(s.after).items() if r > LIMIT] for s in takes}
-    said = "; ".join(f"in {name} {listed(places)}" for name, places in over.items() if places)
-    parts: list[Part] = [Picture(unseen_errors(takes), f"Afterwards still beyond {LIMIT:g} times noise and numerics: {said}."
-                                 if said else f"Afterwards all is within {LIMIT:g} times noise and numerics.")]
+    said = "; ".join(f"in {name} {join_words(places)}" for name, places in over.items() if places)
+    parts: list[Part] = [Picture(
+        unseen_errors(takes), f"With the findings, still above {LIMIT:g} times noise and numerics: {said}." if said else
+        f"With the findings, everything is within {LIMIT:g} times noise and numerics.")]
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
                       f"{s.name}: the body's path as measured, and simulated with and without (nominal) the findings.")
               for s in takes if _walks(s)]

@@ -38,12 +38,13 @@ def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driv
     content = {"format": 1, "claim": CLAIM, "steered": numbers, "discs": [vars(d) for d in discs],
                "not_steered": None if straight is None else drive_numbers(straight),
                "step_map": {k: v if not isinstance(v, tuple) else list(v) for k, v in vars(step_map).items()},
-               "poses": [None if np.isnan(p).any() else p.tolist() for p in closed.poses], "turns": closed.turns.tolist()}
+               "poses": [None if np.isnan(p).any() else p.tolist() for p in closed.poses],
+               "turns": closed.turns.tolist(), "sides": closed.sides.tolist()}
     write_whole(folder / "drive.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
     report = Report("Driven path", f"Way-points passed at {misses} cm; stopped: {closed.reason}.", CLAIM,
                     provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
-    caption = "" if straight is None else "Both robots are the same, with the same gait."
+    caption = "" if straight is None else "Both runs use the same robot and the same gait."
     report.add(Section("The path", [Picture(driven_path(closed, straight, discs), caption)]))
     cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
     report.add(Section("Cycle by cycle", [cycles, _errors(closed, straight)]))
@@ -78,6 +79,7 @@ def _map(m: StepMap) -> Table:
         ["heading change per cycle, going straight", f"{deg(m.bias):.2f} deg"],
         [f"at the largest turn of {m.most:g} rad, same cycle", f"{deg(m.gain * m.most):.1f} deg"],
         [f"at the largest turn of {m.most:g} rad, next cycle", f"{deg(m.memory * m.most):.1f} deg"],
+        ["to the left, per mm of sideways stride", f"{m.side_gain:.2f} mm"],
         ["distance per cycle", f"{100 * m.ahead:.1f} cm"],
         ["scatter of one cycle's heading", f"{deg(m.scatter[0]):.2f} deg"],
         ["scatter of one cycle's lateral position", f"{1000 * m.scatter[1]:.1f} mm"]])

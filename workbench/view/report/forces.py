@@ -1,4 +1,4 @@
-"""What inverse dynamics found, to look at: figures, and the margins as a table."""
+"""Results of inverse dynamics: figures, and the margins as a table."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
 
 
 def _vendor_walk(model: RobotModel, seconds: float) -> tuple[Take, GaitMeasure] | None:
-    """The ROBOTIS walk for so long, and its numbers; None for a robot with other joints."""
+    """The ROBOTIS walk of the same duration, and its numbers; None for a robot with other joints."""
     try:
         motion = load_motion(data_file(WALK), model)
     except InputError:
@@ -154,8 +154,8 @@ def _limits_section(certificate: Certificate) -> Section:
     shown = [rows[certificate.margins.index(m)] for _, m in each(certificate.margins)]
     header = ["limit", "where", "value", "limit", "unit", "left", ""]
     return Section("Limits", [
-        Picture(limit_bars(certificate), "The worst joint or place of each limit; beyond one it is broken. Hatched: advice of "
-                "ROBOTIS, not a limit of this request."),
+        Picture(limit_bars(certificate), "The worst joint or place for each limit; above 1 the limit is exceeded. Hatched: "
+                "recommended by ROBOTIS, not required here."),
         Table(header, shown), Details("Every limit of every joint", [Table(header, rows)])])
 
 
@@ -196,7 +196,7 @@ def _way_section(certificate: Certificate) -> Section:
     rows = [[name, *(f"{value:.2f}" for value in (part.seconds, part.torque, part.tilt, part.jerk))]
             for name, part in (("start", ways.start), ("gait", ways.gait), ("stop", ways.stop))]
     said = ("Both are as smooth as the gait itself." if ways.smooth else
-            "They jerk the robot more than the gait itself does.")
+            "Both jerk the robot more than the gait itself does.")
     return Section("Start, stop and return", [
         Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
              "to neutral; both are in `gait.csv`, and all numbers here are of the whole motion. " + said),

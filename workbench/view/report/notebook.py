@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.compare.metrics import travelled
+from workbench.compare.metrics import displacement
 from workbench.compare.results import Comparison
 from workbench.gait.optimize import Optimized
 from workbench.identify.results.findings import Diagnosis
@@ -21,7 +21,7 @@ SHOWN = 5
 
 
 def comparison_html(comparison: Comparison) -> str:
-    """The finding in a sentence, and of each take the joints that differ most."""
+    """The result in a sentence and, for each take, the joints that differ most."""
     rows = [(take.name, joint, *(_degrees(v) for v in (c.error, c.noise, c.floor)), f"{c.over_noise:.1f}")
             for take in comparison.takes for joint, c in ((j, take.joints[j]) for j in take.joints_by_error()[:SHOWN])]
     return _paragraph(headline(comparison)) + _table(("take", "joint", "error", "noise", "numerical floor", "times both"), rows)
@@ -53,7 +53,7 @@ def _distance(take: Take) -> str:
     """How far the base went, straight and in the plane, from its rest before the first command."""
     if take.base != "free" or take.p_WB is None:
         return "–"
-    return f"{np.hypot(*travelled(take.p_WB, take.since_start)[:2]):.3f} m"
+    return f"{np.hypot(*displacement(take.p_WB, take.since_start)[:2]):.3f} m"
 
 
 def _degrees(radians: float) -> str:

@@ -31,8 +31,8 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under a header. Cells are shown as they are; columns in which all cells look like numbers stand to the right.
-    emphasis: rows to stress, by index."""
+    """Rows under a header. Cells are shown as they are; columns in which all cells look like numbers are right-aligned. emphasis:
+    rows to stress, by index."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -50,8 +50,8 @@ class Picture:
 
 @dataclass(frozen=True)
 class Replay:
-    """A 3D replay that `write_replay` wrote, inside the page; it loads when it is asked for. poster: what stands there till
-    then and on paper, best a `film_strip`."""
+    """A 3D replay that `write_replay` wrote, inside the page; it loads on request. poster: what is shown until then and in print,
+    ideally a `film_strip`."""
 
     path: str | Path
     caption: str = ""
@@ -60,7 +60,7 @@ class Replay:
 
 @dataclass(frozen=True)
 class Details:
-    """Parts folded away under one line, for those who want to see all of them."""
+    """Parts folded away under one line."""
 
     summary: str
     parts: Sequence[Part]
@@ -71,7 +71,7 @@ Part: TypeAlias = Text | Table | Picture | Replay | Curves | Details
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands under it."""
+    """A heading and the parts under it."""
 
     title: str
     parts: Sequence[Part]
@@ -79,7 +79,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from: model's hash, random seed, wall time [s], and what else is worth a name."""
+    """Where a result comes from: the model's hash, random seed, wall time [s], and any other named facts."""
 
     model_sha256: str = ""
     seed: int | None = None
@@ -88,7 +88,7 @@ class Provenance:
 
     @staticmethod
     def of(model: RobotModel, seed: int | None = None, seconds: float | None = None, **more: str) -> Provenance:
-        """Of a result that was computed with `model`."""
+        """The provenance of a result that was computed with `model`."""
         return Provenance(model.sha256, seed, seconds, tuple(more.items()))
 
     def items(self) -> list[tuple[str, str]]:
@@ -118,12 +118,12 @@ class Report:
     sections: list[Section] = field(default_factory=list)
 
     def add(self, section: Section) -> Report:
-        """Appends a section; gives the report back, so that calls chain."""
+        """Appends a section and returns the report, so that calls can be chained."""
         self.sections.append(section)
         return self
 
     def html(self) -> str:
-        """The page; it asks nothing from the network."""
+        """The page; it loads nothing from the network."""
         assets = files("workbench.view").joinpath("assets")
         style = assets.joinpath("report.css").read_text(encoding="utf-8")
         body = [f"<header><p class=kicker>{escape(self.title)}</p><h1>{_inline(self.headline)}</h1>"]
@@ -146,7 +146,7 @@ class Report:
         )
 
     def write(self, path: str | Path) -> Path:
-        """Writes the page, whole or not at all; InputError where `path` cannot be written or a replay cannot be read."""
+        """Writes the page atomically; InputError if `path` cannot be written or a replay cannot be read."""
         return write_whole(path, self.html())
 
 

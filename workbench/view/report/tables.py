@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from workbench.identify.results.findings import Finding, Rejected
 from workbench.identify.results.reasons import LessLikely
 from workbench.view.report.page import Details, Part, Table, Text
-from workbench.view.report.words import change, in_words, listed, name_of, unbroken
+from workbench.view.report.words import change, in_words, join_words, name_of, unbroken
 
 SHOWN = 6
-"""Rows of a table that stand open; the rest is folded away."""
+"""Number of rows shown; the rest are folded away."""
 
 
 def rejected_table(rejected: Sequence[Rejected], summary: str) -> list[Part]:
@@ -22,12 +22,12 @@ def rejected_table(rejected: Sequence[Rejected], summary: str) -> list[Part]:
             for r in sorted(rejected, key=_unlikely)]
     parts = folded_table(header, rows, summary)
     if any(r.reason.of_chi_squared for r in rejected):
-        parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
+        parts.append(Text("Chi squared is the sum of squared errors over noise: the smaller, the better the fit."))
     return parts
 
 
 def _unlikely(r: Rejected) -> float:
-    """By closeness to the finding; those judged by another criterion follow in their order."""
+    """Sorted by closeness to the finding; those judged by another criterion follow in their own order."""
     return r.reason.behind if isinstance(r.reason, LessLikely) else math.inf
 
 
@@ -38,7 +38,7 @@ def _left_by(r: Rejected) -> str:
 
 def place_of(where: Sequence[str]) -> str:
     """Places on one line."""
-    return unbroken(listed(where) or "whole robot")
+    return unbroken(join_words(where) or "whole robot")
 
 
 def rivals(r: Rejected, finding: Finding) -> bool:

@@ -1,4 +1,4 @@
-"""A diagnosis in words and numbers that a person understands at once."""
+"""The results of a diagnosis in words and readable numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
     likely = [f for f in diagnosis.findings if f.likely]
-    names = listed([_with_rival(f, diagnosis.tied) for f in likely or diagnosis.findings])
+    names = join_words([_with_rival(f, diagnosis.tied) for f in likely or diagnosis.findings])
     explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
     match diagnosis.verdict:
         case "no_gap":
@@ -40,7 +40,7 @@ def headline(diagnosis: Diagnosis) -> str:
             sure = "" if len(likely) == len(diagnosis.findings) else " with certainty"
             return f"{explain} part of the model's error; the rest is not identified{sure} yet."
         case "unexplained" if diagnosis.unknown_torques:
-            where = listed([u.joint for u in diagnosis.unknown_torques])
+            where = join_words([u.joint for u in diagnosis.unknown_torques])
             return f"A torque at {where} that no known effect describes explains at least part of the model's error."
         case "unexplained":
             return "The recordings differ from the model, and no known effect explains the difference."
@@ -51,13 +51,13 @@ def hidden_effects(why: Mapping[str, str]) -> list[str]:
     by_reason: dict[str, list[str]] = {}
     for effect, reason in why.items():
         by_reason.setdefault(reason, []).append(effect.replace("_", " "))
-    return [f"**Cannot show here**, because {reason}: {listed(effects)}." for reason, effects in by_reason.items()]
+    return [f"**Cannot show here**, because {reason}: {join_words(effects)}." for reason, effects in by_reason.items()]
 
 
 def _with_rival(f: Finding, tied: Sequence[GravityOverTorque]) -> str:
     if tie := tie_of(f, tied):
         others = [title_of(n.effect, n.where) for n in tie.competitive]
-        return f"a change of gravity over torque at {listed(tie.where)} ({listed(others, 'or')})"
+        return f"a change of gravity over torque at {join_words(tie.where)} ({join_words(others, 'or')})"
     rival = rival_of(f)
     return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
 
@@ -86,7 +86,7 @@ def this_or(tie: Alternative) -> str:
 
 def title_of(effect: str, where: Sequence[str]) -> str:
     """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, which the data cannot separate."""
-    return name_of(effect) + (f" at {listed(where, 'or')}" if where else "")
+    return name_of(effect) + (f" at {join_words(where, 'or')}" if where else "")
 
 
 def name_of(effect: str) -> str:
@@ -104,7 +104,7 @@ def sentence_of(finding: Finding) -> str:
     """How this robot differs from nominal, in the effect's own words."""
     numbers = {name: e.value for name, e in finding.parameters.items()}
     said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
-    others = listed(finding.where[1:], "or")
+    others = join_words(finding.where[1:], "or")
     return said + (f" Or the same at {others}: these recordings cannot tell." if others else "")
 
 
@@ -171,15 +171,15 @@ def layers_of(diagnosis: Diagnosis) -> str:
         return ""
     count = {layer: sum(g.layer == layer for g in diagnosis.gap) for layer in LAYERS}
     seen = sorted((layer for layer in LAYERS if count[layer]), key=lambda layer: -count[layer])
-    said = "By location and timing, the errors look like " + listed(
+    said = "By location and timing, the errors look like " + join_words(
         [f"{layer} errors ({LAYERS[layer]}: {count[layer]} of {len(diagnosis.gap)})" for layer in seen]) + "."
     causes: dict[Layer, list[str]] = {}
     for f in diagnosis.findings:
         causes.setdefault(effect_named(f.effect).layer, []).append(title_of(f.effect, f.where))
     if causes:
-        found = [f"{listed(names)} ({LAYERS[layer]}: {layer})" for layer, names in causes.items()]
+        found = [f"{join_words(names)} ({LAYERS[layer]}: {layer})" for layer, names in causes.items()]
         several = len(diagnosis.findings) > 1
-        said += f" The cause{'s' if several else ''} found: {listed(found)}; one cause may show as errors of several kinds."
+        said += f" The cause{'s' if several else ''} found: {join_words(found)}; one cause may show as errors of several kinds."
     if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
         said += " Such a cause affects many joints at once."
     return said
@@ -195,7 +195,7 @@ def left_row(u: Unexplained) -> list[str]:
     over = f"{u.error / u.floor:.1f}×" if u.floor > 0 else "–"
     by, d = quantity(u.error, u.unit), u.description
     if not isinstance(d, Dependence):
-        return [listed(u.where) or "whole robot", "", by, over, in_words(d)]
+        return [join_words(u.where) or "whole robot", "", by, over, in_words(d)]
     joint, _, axis = d.channel.partition(ACROSS)
     what = f"{joint}, across its axis ({axis})" if axis else _BODY.get(d.channel, f"joint {joint}")
     if d.signal is None:
@@ -211,26 +211,26 @@ def next_said(n: NextExperiment) -> str:
             "with the robot free on the floor")
     pairs = [f"{name_of(a)} from {name_of(b)}" for a, b in n.separates]
     odds = [f"{p} (expected odds of the right name: {_odds(x)})" for p, x in zip(pairs, n.log_likelihood_ratios)] or pairs
-    return f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It separates {listed(odds)}; it keeps within " \
-           "the servos' limits."
+    return (f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It separates {join_words(odds)} and stays "
+            "within the servos' limits.")
 
 
 def _odds(ratio: float) -> str:
     return f"{math.exp(ratio):.0f} to 1" if ratio < math.log(1000) else "more than 1000 to 1"
 
 
-def listed(words: Sequence[str], last: str = "and") -> str:
-    """As in: a, b and c."""
+def join_words(words: Sequence[str], last: str = "and") -> str:
+    """The words as a list: "a, b and c"."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
 def capital(text: str) -> str:
-    """With its first letter large."""
+    """The text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def unbroken(text: str) -> str:
-    """Kept on one line."""
+    """The text with its spaces made non-breaking."""
     return text.replace(" ", "\u00a0")
 
 

@@ -34,7 +34,7 @@ def open_meshcat(port: int | None = None) -> Meshcat:
     """Drake's Meshcat server, on the first free port from 7000 on, or on `port`. InputError where that one is taken."""
     log = logging.getLogger("drake")
     level = log.level
-    log.setLevel(logging.WARNING)  # whoever opens it says where it is
+    log.setLevel(logging.WARNING)  # the caller reports the address
     try:
         return Meshcat(MeshcatParams(port=port, show_stats_plot=False))
     except RuntimeError as e:
@@ -45,10 +45,9 @@ def open_meshcat(port: int | None = None) -> Meshcat:
 
 @singledispatch
 def show(subject: object, meshcat: Meshcat | None = None) -> Meshcat:
-    """Puts a RobotModel, or a Session's first take, into Meshcat and returns it; `.web_url()` says where it is to be seen.
-
-    meshcat: where to; None: a server of its own, on the first free port from 7000 on, while this process lives. A take of your
-    own is shown by `workbench.view.scene.live.show_take`, which takes the model. InputError for anything else.
+    """Puts a RobotModel, or a Session's first take, into Meshcat and returns it; `.web_url()` is its address. meshcat: the server
+    to use; None: a new one, on the first free port from 7000 on, while this process lives. A take of your own is shown by
+    `workbench.view.scene.live.show_take`, which takes the model. InputError for anything else.
     """
     raise InputError(None, f"show: expected a RobotModel or a Session, got {type(subject).__name__}")
 
@@ -128,7 +127,7 @@ def show_session(session: Session, take: str | None = None, meshcat: Meshcat | N
     registered, unregistered = register_takes(alone, takes, {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}, progress)
     if not registered:
         raise InputError(session.path, "; ".join(f"{name}: {reason}" for name, reason in left_out + unregistered))
-    return show_take(registered[0].model, registered[0].observed(rollouts[0].nominal), registered[0].recorded, meshcat)
+    return show_take(registered[0].model, registered[0].observe(rollouts[0].nominal), registered[0].recorded, meshcat)
 
 
 def _add_robot(meshcat: Meshcat, name: str, shapes: RobotShapes, colour: Rgba | None) -> None:

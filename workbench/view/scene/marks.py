@@ -1,4 +1,5 @@
-"""Where and when a recording leaves a model, on the robot of a 3D replay: marks at joints and body in the map's colours."""
+"""Where and when a recording deviates from a model, on the robot of a 3D replay: marks at joints and body in the map's
+colours."""
 
 from __future__ import annotations
 
@@ -26,9 +27,9 @@ COLOUR_TOLERANCE = 0.06
 
 @dataclass(frozen=True)
 class Errors:
-    """How far a recording leaves one model. label: for the legend; time (N,) [s] since the first command; residual (N, c) over
-    noise, numerics and contact models, NaN where unseen; channels: (c) joints, joints across an axis, the body's. shown: from the
-    start, or on demand."""
+    """How far a recording deviates from one model. label: for the legend; time (N,) [s] since the first command; residual (N, c)
+    over noise, numerics and contact models, NaN where unseen; channels: (c) joints, joints across an axis, the body's. shown:
+    from the start, or on demand."""
 
     label: str
     time: Array

@@ -52,10 +52,10 @@ def write_replay(
 ) -> ReplayFile:
     """Writes the replay; the same takes give the same bytes.
 
-    simulated: solid, with its contact forces as arrows. recorded: translucent, laid over it where both stood before the
-    first command. In gaps it holds the last pose seen; joints nobody measured follow the simulation. The forces are
-    averaged over a frame. errors: how far the recording leaves one model or several, shown at the recorded robot's joints and
-    body. InputError where `path` cannot be written.
+    simulated: solid, with its contact forces as arrows. recorded: translucent, laid over it where both stood before the first
+    command. In gaps it holds the last pose seen; joints that were not measured follow the simulation. The forces are averaged
+    over a frame. errors: how far the recording deviates from one model or several, shown at the recorded robot's joints and body.
+    InputError if `path` cannot be written.
     """
     takes = [simulated] if recorded is None else [simulated, recorded]
     first, last = common_span(takes)
@@ -89,7 +89,7 @@ class Scene:
         self.low, self.high = where.min(axis=0), where.max(axis=0)
         self.middle = (float((self.low + self.high)[0] / 2), float((self.low + self.high)[1] / 2))
         links = [p.in_world(link)[0] for p in played for link in p.links]
-        # an arm may reach far beyond its height when stretched, and stand high above the floor
+        # a stretched arm may reach far beyond its height, and be mounted high above the floor
         self.tall = max(shapes.height, max(float(p[:, 2].max()) for p in links))
         wide = max(float(np.linalg.norm(p[:, :2] - self.middle, axis=1).max()) for p in links)
         self.reach = max(1.15 * self.tall + 0.5 * float(np.linalg.norm(self.high - self.low)), wide)

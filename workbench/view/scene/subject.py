@@ -1,4 +1,4 @@
-"""What there is to see in a file: a robot, a session, or a take."""
+"""What a file holds to be viewed: a robot, a session, or a take."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from workbench.simulation.play import play_motion
 
 
 def subject_of(name: str) -> Literal["model", "session", "take"]:
-    """Recognised by the name and, for a YAML file, by its keys. InputError where a YAML file cannot be read."""
+    """The kind, recognised by the name and, for a YAML file, by its keys. InputError if a YAML file cannot be read."""
     path = Path(name)
     if name in ROBOTS or name.startswith("package://") or path.suffix.lower() in (".sdf", ".urdf", ".xml"):
         return "model"

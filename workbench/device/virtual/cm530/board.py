@@ -62,7 +62,7 @@ class Board:
         self.directions: list[tuple[int, bool, bool]] = []
         self.resets: list[tuple[int, int]] = []
         self._rng = random.Random(seed)
-        self.cpu = Processor(clock, self._read, self._write, self._pending, self._taken)
+        self.cpu = Processor(clock, self._read, self._write, self._pending, self._on_taken)
         self.cpu.uc.mem_write(APPLICATION, image)
         self.clocks, self.core, self.watchdog = Clocks(self), Core(self), Watchdog(self)
         self.ports = {name: Port(self, (0x18, 2 + k)) for k, name in enumerate("ABCD")}
@@ -139,7 +139,7 @@ class Board:
         if found is None:
             raise BoardError(f"no such register: {address:#010x}")
         if not found[0].clocked:
-            self._violated(f"register {address:#010x} used while its clock is off")
+            self._record_violation(f"register {address:#010x} used while its clock is off")
         return found
 
     def _read(self, address: int) -> int:
@@ -157,15 +157,15 @@ class Board:
         if self.core.tick_waits:
             return SYSTICK
         for irq, waits in self._interrupts:
-            if waits() and self.core.enabled(irq):
+            if waits() and self.core.is_enabled(irq):
                 return 16 + irq
         return None
 
-    def _taken(self, number: int) -> None:
+    def _on_taken(self, number: int) -> None:
         if number == SYSTICK:
             self.core.tick_waits = False
 
-    def _violated(self, what: str) -> None:
+    def _record_violation(self, what: str) -> None:
         self.violations.append(Violation(self.clock.now, what))
 
     # Pins
@@ -184,17 +184,17 @@ class Board:
             return
         self.directions.append((self.clock.now, *now))
         if self.servo_usart.sending:
-            self._violated("the servo bus was turned while bytes were under way")
+            self._record_violation("the servo bus was turned while bytes were under way")
 
     # Wires
 
     def _to_servos(self, data: bytes, rate: int, start: int) -> None:
         port = self.ports["B"]
         if not port.drives(TALK_PIN) or port.drives(LISTEN_PIN):
-            self._violated(f"{len(data)} bytes sent while the bus was set to receive")
+            self._record_violation(f"{len(data)} bytes sent while the bus was set to receive")
             return
         if port.mode(6) & 3 == 0 or not self.peripherals[0x40010000].read(4) & 4:
-            self._violated("bytes sent with USART1 not on pin PB6")
+            self._record_violation("bytes sent with USART1 not on pin PB6")
             return
         self.bus.talk(self, data, rate, start)
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from dynamixel_sdk import PortHandler
-
 from workbench.device.virtual.clock import MILLISECOND, SECOND
 from workbench.device.virtual.cm530.board import Board
+from workbench.device.virtual.port import MemoryPort
 
 
-class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
-    """The serial port that a PC would have; waiting costs no wall time but the board's."""
-
-    patience = 3.0
+class PcLinkPort(MemoryPort):
+    """The serial port that a PC would have; waiting costs no wall time but the board's. A wrong rate reads as silence."""
 
     def __init__(self, board: Board) -> None:
         super().__init__("virtual CM-530")
@@ -22,21 +19,6 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         self._read = 0
         self.clearPort()
         self.setupPort(57_600)
-
-    def setupPort(self, cflag_baud: int) -> bool:
-        """The board's link has one rate; a wrong one reads as silence here."""
-        self.baudrate = cflag_baud
-        self.tx_time_per_byte = 10_000 / cflag_baud
-        self.is_open = True
-        return True
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """Starts the time-out for an answer of so many bytes."""
-        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
-
-    def closePort(self) -> None:
-        """Closes."""
-        self.is_open = False
 
     def clearPort(self) -> None:
         """Forgets what came in."""

@@ -55,7 +55,7 @@ class Processor:
         self._frame = Registers(uc, (*_STACKED, arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR))
         self._place = Registers(uc, (arm.UC_ARM_REG_PC, arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_SP))
         self._sleeps: dict[int, bool] = {}
-        engine.on_interrupt(self._interrupted)
+        engine.on_interrupt(self._leave_interrupt)
 
     def reset(self, vectors: int) -> None:
         """Starts at the reset vector of a table."""
@@ -128,7 +128,7 @@ class Processor:
             known = self._sleeps[pc] = self.engine.peek(pc - 2, 2) == _WFI
         return known
 
-    def _interrupted(self, number: int) -> None:
+    def _leave_interrupt(self, number: int) -> None:
         self._exit = number
         self.engine.stop()
 
@@ -161,7 +161,7 @@ class Processor:
                 value = read(address)
                 cycles.limit = clock.next_time  # it may have asked for an event that is sooner than any before
             except Exception as e:  # raised again where Python code runs, not in the engine's callback
-                self._failed(e)
+                self._fail(e)
                 return 0
             return value
 
@@ -176,10 +176,10 @@ class Processor:
                 write(address, size, value)
                 cycles.limit = clock.next_time
             except Exception as e:
-                self._failed(e)
+                self._fail(e)
 
         return call
 
-    def _failed(self, error: Exception) -> None:
+    def _fail(self, error: Exception) -> None:
         self._error = error
         self.engine.stop()

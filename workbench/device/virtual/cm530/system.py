@@ -30,7 +30,7 @@ class Clocks(Peripheral):
         """All gates shut, internal oscillator."""
         super().reset()
         self.words[0] = 0x83
-        self._settled()
+        self._set_clocks()
 
     def read(self, offset: int) -> int:
         """Ready bits follow the on bits; CSR tells what reset there was."""
@@ -48,9 +48,9 @@ class Clocks(Peripheral):
                 self.causes = 0
             value &= 1
         super().write(offset, value)
-        self._settled()
+        self._set_clocks()
 
-    def _settled(self) -> None:
+    def _set_clocks(self) -> None:
         """What runs, and how fast, as far as the program has set it up."""
         control, config = self.words[0], self.words[4]
         on_pll = config & 3 == 2 and control & 1 << 24 and control & 1 << 16
@@ -77,7 +77,7 @@ class Core(Peripheral):
         self.tick_waits = False
         self._generation += 1
 
-    def enabled(self, irq: int) -> bool:
+    def is_enabled(self, irq: int) -> bool:
         """Whether an interrupt is let through."""
         return bool(self.words[0x104 if irq > 31 else 0x100] >> irq % 32 & 1)
 
@@ -141,9 +141,9 @@ class Watchdog(Peripheral):
             self._fed += 1
             fed = self._fed
             wait = (self.words[8] + 1) * (4 << self.words[4]) * SECOND // 40_000
-            self.board.clock.after(wait, lambda: self._starved(fed))
+            self.board.clock.after(wait, lambda: self._reset_if_starved(fed))
 
-    def _starved(self, fed: int) -> None:
+    def _reset_if_starved(self, fed: int) -> None:
         if self.started and fed == self._fed:
             self.board.reset(WATCHDOG_RESET)
 
@@ -157,10 +157,10 @@ class Converter(Peripheral):
         """SWSTART converts in 21 microseconds."""
         if offset == 8 and value & 1 << 22 and value & 1 and self.read(0x34) & 31 == 13:
             value &= ~(1 << 22)
-            self.board.clock.after(21 * MICROSECOND, self._converted)
+            self.board.clock.after(21 * MICROSECOND, self._finish_conversion)
         super().write(offset, value)
 
-    def _converted(self) -> None:
+    def _finish_conversion(self) -> None:
         self.words[0x4C] = min(round(160 * self.board.battery), 4095)
         self.words[0] |= 2
 

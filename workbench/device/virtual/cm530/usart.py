@@ -90,9 +90,9 @@ class Usart(Peripheral):
         self._shifting_until = now + self.byte
         self._sends(bytes([value]), self.rate, now)
         epoch = self._epoch
-        self.board.clock.at(self._shifting_until, lambda: self._shifted(epoch))
+        self.board.clock.at(self._shifting_until, lambda: self._finish_shift(epoch))
 
-    def _shifted(self, epoch: int) -> None:
+    def _finish_shift(self, epoch: int) -> None:
         if epoch != self._epoch:
             return
         if self._hold is not None:
@@ -111,14 +111,14 @@ class Usart(Peripheral):
         self._sends(data, self.rate, start)
         epoch = self._epoch
 
-        def done() -> None:
+        def finish_block() -> None:
             if epoch != self._epoch:
                 return
             self.words[SR] |= TC | TXE
             ended()
             self.board.cpu.wish()
 
-        self.board.clock.at(self._shifting_until, done)
+        self.board.clock.at(self._shifting_until, finish_block)
 
     @property
     def sending(self) -> bool:
@@ -175,7 +175,7 @@ class Dma(Peripheral):
         channel.armed = self.board.clock.now
         channel.serve()
 
-    def finished(self, channel: int) -> None:
+    def finish(self, channel: int) -> None:
         """Transfer complete."""
         self.words[0] |= 3 << 4 * (channel - 1)
         self.board.cpu.wish()
@@ -217,7 +217,7 @@ class Channel:
         count = words[self.base + 4]
         words[self.base + 4] = 0
         data = self.dma.board.cpu.engine.peek(words[self.base + 12], count)
-        usart.send_block(data, lambda: self.dma.finished(self.number))
+        usart.send_block(data, lambda: self.dma.finish(self.number))
 
     def take(self, data: bytes) -> int:
         """USART to memory; returns how many bytes the channel still wanted."""
@@ -230,5 +230,5 @@ class Channel:
         self.dma.board.cpu.engine.poke(words[self.base + 12] + self._taken, data[:count])
         self._taken += count
         if left == count:
-            self.dma.finished(self.number)
+            self.dma.finish(self.number)
         return count
