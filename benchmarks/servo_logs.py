@@ -42,15 +42,15 @@ def servo_log_rollouts(duration: float, models: int, repeats: int, seed: int) ->
         frictions = [(float(a) * SERVO["coulomb_friction"], float(b) * SERVO["viscous_friction"]) for a, b in draws]
         commands = log.commands
 
-        def ours(several: Sequence[tuple[float, float]]) -> list[Array]:
+        def ours(several: Sequence[tuple[float, float]], in_lanes: bool) -> list[Array]:
             played = servo_angles([[Job(_rubbing(model, *f), config, commands, duration + 2e-3, REST, times=log.time)]
-                                   for f in several])
+                                   for f in several], in_lanes)
             return [angles[0] for angles in played if not isinstance(angles, NotCoveredError)]
 
         columns = [model.joints.index(j) for j in theirs.joints]
         few = frictions[:3]
-        apart = max(float(np.abs(q[:, columns] - theirs.played(f, log.time)).max()) for f, q in zip(few, ours(few)))
-        seconds = in_turns({"alone": lambda: [ours([f]) for f in frictions], "lanes": lambda: ours(frictions),
+        apart = max(float(np.abs(q[:, columns] - theirs.played(f, log.time)).max()) for f, q in zip(few, ours(few, True)))
+        seconds = in_turns({"alone": lambda: [ours([f], False) for f in frictions], "lanes": lambda: ours(frictions, True),
                             "mujoco": lambda: [theirs.played(f, log.time) for f in frictions]}, repeats)
     details = {"log_seconds": duration, "step_seconds": PROBLEM.time_step, "models": models, "turns": repeats,
                "milliseconds_per_model": {n: float(np.median(s)) / models * 1e3 for n, s in seconds.items()},

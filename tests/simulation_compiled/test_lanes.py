@@ -80,7 +80,7 @@ def jobs_of(models, commands: Commands, restarts: JointStates | None = None) -> 
 
 def largest_difference(jobs: list[Job]) -> float:
     """Between robots that play together and the same alone, after a check that they differ."""
-    side_by_side, alone = servo_angles([[job] for job in jobs]), [servo_angles([[job]])[0] for job in jobs]
+    side_by_side, alone = servo_angles([[job] for job in jobs]), servo_angles([[job] for job in jobs], in_lanes=False)
     assert np.nanmax(np.ptp([q for (q,) in alone], axis=0)) > 1e-4
     return max(float(np.nanmax(np.abs(a - b))) for (a,), (b,) in zip(side_by_side, alone))
 
@@ -104,7 +104,7 @@ def test_robots_with_other_effects_play_in_lanes_as_each_does_alone(arm, calls, 
     models = of_several_kinds(arm)
     assert largest_difference(jobs_of(models, swings(arm, enabled=enabled))) < SAME
     assert calls.lanes >= 2 * (len(models) // LANES)  # settling, and the run
-    assert calls.alone <= len(models) + 4  # each for comparison, and those that are left over
+    assert calls.alone == len(models)  # each for comparison
 
 
 def test_robots_with_play_are_put_back_in_lanes_as_each_is_alone(arm, calls):
@@ -116,17 +116,19 @@ def test_robots_with_play_are_put_back_in_lanes_as_each_is_alone(arm, calls):
     assert calls.lanes == 2
 
 
-def test_what_lanes_do_not_know_plays_alone(arm, calls):
+def test_robots_with_torque_tables_play_alone(arm, calls):
     tables = [TorqueTable("angle", (-1.0, 0.0, 1.0), (size, -size, size)) for size in (0.05, 0.1, 0.15)]
     models = [arm.with_servos({"torque_tables": (table,)}) for table in tables]
     assert largest_difference(jobs_of(models, swings(arm))) == 0.0
     assert calls.lanes == 0
 
 
-def test_too_few_robots_play_alone(arm, calls):
-    models = [arm, worn(arm, ("coulomb_friction", {"torque": 0.1}))]
-    assert largest_difference(jobs_of(models, swings(arm))) == 0.0
-    assert calls.lanes == 0
+def test_who_plays_along_changes_no_bit(arm):
+    """Else results would depend on the number of workers, and on where a run that was killed is resumed."""
+    jobs = jobs_of(of_several_kinds(arm), swings(arm))
+    together_, one_by_one = servo_angles([[job] for job in jobs]), [servo_angles([[job]])[0] for job in jobs]
+    for (a,), (b,) in zip(together_, one_by_one):
+        np.testing.assert_array_equal(a, b)
 
 
 def rubbing(model: RobotModel) -> list[RobotModel]:

@@ -30,8 +30,6 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.types import Array
 
-FEWEST = 3
-"""Robots from which on lanes are worth it: a step of all of them takes as long as two of one."""
 Play = tuple[CompiledJob, Schedule]
 
 
@@ -44,16 +42,17 @@ class _Robots(NamedTuple):
     room: Room
 
 
-def joint_angles(plays: Sequence[Play]) -> list[Array | NotCoveredError]:
+def joint_angles(plays: Sequence[Play], in_lanes: bool = True) -> list[Array | NotCoveredError]:
     """Angles (rows, n) [rad] of all joints at the rows of each run's log, or why it has to be Drake's.
 
-    In lanes go held robots without torque tables, at least FEWEST of one structure on one and the same schedule: these may differ
-    in masses, springs, play, limits, friction, gravity and in all that servos do. A lane in which links touch is played again
-    alone. Angles are those of the kernel of one robot, to rounding, on a processor without vectors, too, which gains nothing.
+    In lanes go held robots without torque tables, those of one structure on one schedule together: they may differ in
+    masses, springs, play, limits, friction, gravity and in all that servos do. A lane in which links touch is played again alone.
+    Who plays along changes no bit of a robot's angles, so that even one is played in lanes. in_lanes: False plays each alone, by
+    the kernel of one robot; angles are the same to rounding. On a processor without vectors they are, too, but nothing is gained.
     """
     out: list[Array | NotCoveredError | None] = [None] * len(plays)
     robots: dict[tuple[int, ...], _Robots] = {}
-    for here in _in_step(plays):
+    for here in _in_step(plays) if in_lanes else ():
         chunk = [plays[k][0] for k in here]
         key = tuple(id(c.machine) for c in chunk)
         if key not in robots:
@@ -83,8 +82,7 @@ def _in_step(plays: Sequence[Play]) -> Iterator[list[int]]:
     for group in groups.values():
         group.sort(key=lambda k: _terms(plays[k][0]))
         for begin in range(0, len(group), LANES):
-            if len(group) - begin >= FEWEST:
-                yield group[begin:begin + LANES]
+            yield group[begin:begin + LANES]
 
 
 def _terms(job: CompiledJob) -> tuple[int, ...]:
@@ -101,9 +99,8 @@ def _played(chunk: Sequence[CompiledJob], schedule: Schedule, robots: _Robots) -
         for i, c in enumerate(chunk):
             if fit[i] and not c.is_settled:
                 c.settle(state_of_lane(states, i))
-    if not all(c.is_settled for c in chunk):
-        return [None] * len(chunk)
-    q, well = _run(chunk, schedule, states_in_lanes([c.begin() for c in chunk]), chunk[0].rows, robots)
+    states = states_in_lanes([c.begin() if c.is_settled else _upright(c) for c in chunk])
+    q, well = _run(chunk, schedule, states, chunk[0].rows, robots)
     return [q[i] if fit[i] and well[i] else None for i in range(len(chunk))]
 
 
@@ -119,7 +116,7 @@ def compile_lanes() -> bool:
     if is_compiled(LANES_KERNEL):
         return False
     job = CompiledJob(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0, times=np.zeros(1)))
-    joint_angles([(job, job.schedule())] * FEWEST)
+    joint_angles([(job, job.schedule())])
     return True
 
 
