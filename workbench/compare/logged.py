@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from workbench.compare.session_takes import ReadTake
+from workbench.files.problem import CorrectedProblem
 from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
-
-_CHANGED = ("taken out", "left out", "set right", "evidence ends", "turned back", "undone")
-"""Endings of lines that report a change to the log rather than only a doubt."""
 
 
 def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
@@ -26,7 +24,7 @@ def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
 
 def set_aside(problems: Sequence[str]) -> list[str]:
     """The problems of a recording that report corrected readings, or readings excluded from the evidence."""
-    return [text for text in problems if any(word in text for word in _CHANGED)]
+    return [text for text in problems if isinstance(text, CorrectedProblem)]
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:

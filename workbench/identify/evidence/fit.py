@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, Term, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
 from workbench.types import Array
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.region import Region
 
 T = TypeVar("T")
+Key = frozenset[Term]
 Asks = Generator[list[Hypothesis], list[Array], T]
 """Yields hypotheses to be rolled out, is sent the residuals (n,) [rad] that each leaves."""
 
@@ -55,6 +56,14 @@ class Fitted:
             taken = np.linalg.solve(self.beside.T @ W + np.diag(h.law.precision), W.T @ self.J)
             H = _at_least(H - (self.J.T @ W) @ taken, Prior.of(h, options).precision(h.theta))
         return np.asarray(np.linalg.inv(H))
+
+
+def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
+    """Of each set of effects the likelier fit."""
+    out = dict(fits)
+    for f in more:
+        out[f.hypothesis.key] = max(f, out.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
+    return out
 
 
 def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> Array:

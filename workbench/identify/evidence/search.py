@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
-from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
+from workbench.identify.evidence.fit import Asks, Fitted, Key, fitting, judged, polished, side_by_side, with_better, without
+from workbench.identify.evidence.hypothesis import Hypothesis, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, linearised_around, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
@@ -21,8 +21,6 @@ from workbench.types import Progress
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts
-
-Key = frozenset[Term]
 
 
 @dataclass(frozen=True)
@@ -192,14 +190,6 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
         return []
     there, moves = yield from linearised_around(region, options, h)
     return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
-
-
-def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
-    """Of each set of effects the likelier fit."""
-    out = dict(fits)
-    for f in more:
-        out[f.hypothesis.key] = max(f, out.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
-    return out
 
 
 def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:

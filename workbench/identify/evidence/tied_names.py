@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.identify.conclusions import estimates
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side, with_better
 from workbench.identify.evidence.hypothesis import FAR, Hypothesis, Uncertain
 from workbench.identify.evidence.linearise import linearised, linearised_around
 from workbench.identify.evidence.nuisance import mixing
@@ -17,7 +17,6 @@ from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.search import with_better
 from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque, competes
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.findings import Alternative, Estimate, Finding

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, slopes, without
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, slopes, with_better, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.search import Found, with_better
+from workbench.identify.evidence.search import Found
 from workbench.identify.evidence.torque_law import TorqueLaw
 from workbench.types import Array
 

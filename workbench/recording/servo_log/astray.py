@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files.problem import RemovedReadings
 from workbench.types import Array
 
 
@@ -50,8 +51,9 @@ def without_astray(time: Array, position: Array, c: AstrayChecks = ASTRAY) -> tu
     one = len(returning) == 1 and bool(np.isin(values[off], returning).all())
     value = f"all of exactly {np.rad2deg(returning[0]):.4g} deg" if one else \
         f"the first of {np.rad2deg(values[first]):.4g} deg"
-    return out, [f"{int(off.sum())} single reading(s) lie off the joint's way, {value}, the first at {time[seen[first]]:.3f} s "
-                 f"(row {seen[first] + 1}): as a bus writes when a servo does not answer; taken out"]
+    return out, [RemovedReadings(f"{int(off.sum())} single reading(s) lie off the joint's way, {value}, the first at "
+                                 f"{time[seen[first]]:.3f} s (row {seen[first] + 1}): as a bus writes when a servo does not "
+                                 "answer; taken out")]
 
 
 def _off(values: Array, c: AstrayChecks) -> NDArray[np.bool_]:

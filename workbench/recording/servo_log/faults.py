@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.files.problem import CorrectedProblem, name_problem
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.astray import without_astray
 from workbench.recording.servo_log.exchanged import find_exchanged
@@ -43,20 +44,20 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
             continue
         for read in (without_astray, without_no_answer, without_repeats):
             channels[name], said = read(recording.time, channels[name])
-            lines += [f"{name}: {text}" for text in said]
+            lines += [name_problem(name, text) for text in said]
     mended = replace(recording, channels=channels)
     logs = {j: log for j, log in joint_logs(mended).items() if j in joints}
     no_goals = set()
     for joint, log in logs.items():
         if (text := relative_goals(log)) is not None:
             no_goals.add(joint)
-            lines.append(f"goal.{joint}: {text}; the joint's evidence is left out")
+            lines.append(CorrectedProblem(f"goal.{joint}: {text}; the joint's evidence is left out"))
     swapped = find_exchanged({j: log for j, log in logs.items() if j not in no_goals})
     no_goals |= set(swapped)
     for joint, other in swapped.items():
         back = " and the other way round" if swapped.get(other) == joint else ""
-        lines.append(f"position.{joint}: follows goal.{other}, not goal.{joint}{back}: are the columns of {joint} and {other} "
-                     "exchanged? Its evidence is left out")
+        lines.append(CorrectedProblem(f"position.{joint}: follows goal.{other}, not goal.{joint}{back}: are the columns of "
+                                      f"{joint} and {other} exchanged? Its evidence is left out"))
     for joint, log in logs.items():
         if joint in no_goals:
             continue
@@ -81,7 +82,7 @@ def _undo_zero_shift(channels: dict[str, np.ndarray], log: JointLog) -> tuple[Jo
     values = channels[name].copy()
     values[log.rows] -= off
     channels[name] = values
-    return replace(log, position=log.position - off), [f"{name}: {text}" for text in said]
+    return replace(log, position=log.position - off), [name_problem(name, text) for text in said]
 
 
 def _blank_released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
@@ -103,6 +104,6 @@ def _blank_released(channels: dict[str, np.ndarray], recording: Recording, log: 
         channels[name] = values
         when = f"from {recording.time[at]:.3f} s (row {at + 1}) " + (
             "on" if to_end else f"to {recording.time[last]:.3f} s (row {last + 1}), where it follows again")
-        out.append(f"{name}: no longer depends on goal.{log.name} {when}: {causes}; its evidence "
-                   f"{'ends there' if to_end else 'of that time is left out'}")
+        out.append(CorrectedProblem(f"{name}: no longer depends on goal.{log.name} {when}: {causes}; its evidence "
+                                    f"{'ends there' if to_end else 'of that time is left out'}"))
     return out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files.problem import CorrectedProblem, RemovedReadings
 from workbench.recording.servo_log.state import count_of, resolution
 from workbench.types import Array
 
@@ -79,19 +80,19 @@ class _Said:
         self.found.setdefault(kind, []).append((rows, jump))
 
     def lines(self) -> list[str]:
-        out = []
+        out = list[str]()
         for kind, places in self.found.items():
             count, (rows, jump) = sum(len(r) for r, _ in places), places[0]
             at = f"{np.rad2deg(jump):+.1f} deg at {self.time[rows[0]]:.3f} s"
             if kind == "turns":
-                out.append(f"{count} reading(s) are whole turns off, first by {at}; turned back")
+                out.append(CorrectedProblem(f"{count} reading(s) are whole turns off, first by {at}; turned back"))
             elif kind == "a 16-bit register that wrapped":
-                out.append(f"{count} reading(s) come from {kind}, first by {at}; undone")
+                out.append(CorrectedProblem(f"{count} reading(s) come from {kind}, first by {at}; undone"))
             elif kind == "no turn":
                 out.append(f"{count} reading(s) lie where no servo gets that fast, first by {at}; left as they are"
                            f"{_much(count, len(self.time))}")
             else:
-                out.append(f"{count} reading(s) leap away by {kind}, first by {at}; taken out")
+                out.append(RemovedReadings(f"{count} reading(s) leap away by {kind}, first by {at}; taken out"))
         return out
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.files.problem import RemovedReadings
 from workbench.recording.runs import runs_of_equals
 from workbench.types import Array
 
@@ -56,9 +57,9 @@ def without_no_answer(time: Array, position: Array, c: NoAnswerChecks = NO_ANSWE
     value = np.rad2deg(values[found[0][0]])
     all_of = f"of exactly {value:.4g} deg" if len(known) == 1 else f"the first of {value:.4g} deg"
     first = seen[found[0][0]]
-    return out, [f"{len(rows)} reading(s) in {len(found)} stretch(es) {all_of}, to which the joint leaps and from which it leaps "
-                 f"back, the first from {time[first]:.3f} s (row {first + 1}): as a bus or driver writes when a servo does not "
-                 "answer; taken out"]
+    return out, [RemovedReadings(f"{len(rows)} reading(s) in {len(found)} stretch(es) {all_of}, to which the joint leaps and "
+                                 f"from which it leaps back, the first from {time[first]:.3f} s (row {first + 1}): as a bus or "
+                                 "driver writes when a servo does not answer; taken out")]
 
 
 def _comes_back(values: Array, first: int, last: int) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
+from workbench.files.problem import RemovedReadings, name_problem
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
@@ -71,7 +72,7 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
             channels[name] = np.full(len(time), np.nan)
         elif name in channels and not (goal is not None and _in_another_unit(goal)):
             channels[name], said = without_leaps(time, channels[name])
-            problems += [f"{name}: {text}" for text in said]
+            problems += [name_problem(name, text) for text in said]
     read = replace(recording, channels=channels)
     for check in (_clock, _no_command):
         problems += check(read, checks)
@@ -79,7 +80,7 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     problems += supply_problems(read)
     problems += channel_problems(read)
     mended = without_faults(read, frozenset(j for j in read.joints if any(
-        text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
+        text.startswith((f"goal.{j}:", f"position.{j}:")) and not isinstance(text, RemovedReadings) for text in problems)))
     problems += mended.lines
     problems += _frozen_sensors(mended.recording, checks)
     if not any(text.startswith("goal.") for text in problems):  # otherwise these are not goals, or have another unit

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.files.problem import RemovedReadings
 from workbench.recording.runs import runs_of_equals
 from workbench.types import Array
 
@@ -54,12 +55,12 @@ def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> 
     rows = sum(n - 1 for n in lengths)
     usual = int(np.median(lengths))
     if lengths.count(usual) > c.regular * len(lengths) and rows > c.regular * len(values) * (usual - 1) / usual / 2:
-        return out, [f"is new only in every {usual}th row (in {len(found)} stretches at least): read more slowly than the log is "
-                     f"written; {rows} repeated reading(s) taken out"]
+        return out, [RemovedReadings(f"is new only in every {usual}th row (in {len(found)} stretches at least): read more slowly "
+                                     f"than the log is written; {rows} repeated reading(s) taken out")]
     lasts = f"{min(lengths)} to {max(lengths)}" if min(lengths) < max(lengths) else f"{lengths[0]}"
-    return out, [f"repeats the same reading for {lasts} rows while the joint moves, in {len(found)} stretches, the first from "
-                 f"{time[seen[found[0][0]]]:.3f} s (row {seen[found[0][0]] + 1}): as a reader does when the bus times out; "
-                 f"{rows} repeated reading(s) taken out"]
+    return out, [RemovedReadings(f"repeats the same reading for {lasts} rows while the joint moves, in {len(found)} stretches, "
+                                 f"the first from {time[seen[found[0][0]]]:.3f} s (row {seen[found[0][0]] + 1}): as a reader "
+                                 f"does when the bus times out; {rows} repeated reading(s) taken out")]
 
 
 def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChecks) -> bool:

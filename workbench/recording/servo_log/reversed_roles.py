@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.files.problem import CorrectedProblem
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.following import JointLog, joint_logs
 from workbench.recording.servo_log.response import fit_response, shapes
@@ -36,8 +37,8 @@ def reversed_roles(r: Recording, c: RoleChecks = ROLES) -> Iterator[tuple[str, s
             continue
         answer = _unexplained_share(log, log.position, log.goal)
         if answer < c.unexplained and c.better * answer < _unexplained_share(log, log.goal, log.position):
-            yield joint, (f"goal.{joint}: follows position.{joint}, as only a position follows its goal: are the two columns "
-                          "exchanged? The joint's evidence is left out")
+            yield joint, CorrectedProblem(f"goal.{joint}: follows position.{joint}, as only a position follows its goal: are the "
+                                          "two columns exchanged? The joint's evidence is left out")
 
 
 def _steps(log: JointLog, c: RoleChecks) -> bool:

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from workbench.files.problem import CorrectedProblem
 from workbench.recording.servo_log.following import JointLog
 from workbench.recording.servo_log.response import fit_response, shapes
 from workbench.types import Array
@@ -116,5 +117,5 @@ def _line(log: JointLog, off: Array, edges: list[int]) -> str:
         where = f"from {log.time[a]:.3f} to {log.time[b - 1]:.3f} s (rows {log.rows[a] + 1} to {log.rows[b - 1] + 1})"
     else:
         where = f"in {len(shifted)} stretches, the first from {log.time[a]:.3f} s (row {log.rows[a] + 1})"
-    return (f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or homing "
-            "offset, a slipped horn or sensor); set right by that much")
+    return CorrectedProblem(f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or "
+                            "homing offset, a slipped horn or sensor); set right by that much")
