@@ -14,7 +14,7 @@ from benchmarks import compiled, drives, engine, reader
 from benchmarks.captured import captured_against_observed
 from benchmarks.diagnose_time import diagnose_time
 from benchmarks.figure import Figure
-from benchmarks.servo_logs import servo_log_rollouts_against_mujoco
+from benchmarks.servo_logs import servo_log_rollouts
 from benchmarks.sysid import fit_against_mujoco_sysid
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
@@ -92,12 +92,12 @@ def _fits(quick: bool, progress: Callable[[str], None]) -> list[Figure]:
     progress("fit against MuJoCo's system identification")
     fit = fit_against_mujoco_sysid(LOG_QUICK, 1, SEED, iterations=1) if quick else fit_against_mujoco_sysid(LOG, TURNS, SEED)
     progress("rollouts of a servo log against MuJoCo's")
-    logs = (servo_log_rollouts_against_mujoco(LOG_QUICK, 2, 1, SEED) if quick
-            else servo_log_rollouts_against_mujoco(LOG, MODELS, LOG_TURNS, SEED))
+    logs = (servo_log_rollouts(LOG_QUICK, 2, 1, SEED) if quick
+            else servo_log_rollouts(LOG, MODELS, LOG_TURNS, SEED))
     progress("rollouts of captured takes")
     captured = captured_against_observed(*(CAPTURED_QUICK if quick else CAPTURED))
     progress("where a diagnosis spends its time")
-    return [fit, logs, *captured, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
+    return [fit, *logs, *captured, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
 
 
 def _machine(load: float) -> dict[str, Any]:

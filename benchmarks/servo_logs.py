@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,41 +14,50 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.rollouts.servo_logs import REST, SETTLE
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig
+from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.types import Array
 
-NAME = "servo_log_rollouts_against_mujoco"
-MEANING = ("speed of this library's rollouts of a held arm's servo log over MuJoCo's, each with other frictions of one joint, at "
-           "the same step; both include building the model and reading angles at the log's times")
+SHARED = ("of a held arm's servo log, each with other frictions of one joint; building the models and reading angles at the "
+          "log's times are included")
+NAMES = {"servo_log_rollouts_against_mujoco": ("mujoco", "alone", "this library's rollouts, one by one, over MuJoCo's"),
+         "servo_log_lanes_against_mujoco": ("mujoco", "lanes", "this library's rollouts, in lanes, over MuJoCo's"),
+         "servo_log_lanes_against_alone": ("alone", "lanes", "rollouts played together in lanes over the same one by one")}
+"""Figures: the slower, the faster, and what the ratio means."""
 
 
-def servo_log_rollouts_against_mujoco(duration: float, models: int, repeats: int, seed: int) -> Figure:
+def servo_log_rollouts(duration: float, models: int, repeats: int, seed: int) -> list[Figure]:
     """Processor time. duration: of the log [s]; models: how many pairs of frictions."""
+    meanings = {name: f"speed of {what}, {SHARED}" for name, (_, _, what) in NAMES.items()}
     try:
         from studies.other_engine.sysid import Identification
     except ImportError as e:
-        return Figure(NAME, MEANING, skipped=f'MuJoCo\'s twin is in the source tree, its toolbox in "mujoco[sysid]" ({e})')
+        why = f'MuJoCo\'s twin is in the source tree, its toolbox in "mujoco[sysid]" ({e})'
+        return [Figure(name, meaning, skipped=why) for name, meaning in meanings.items()]
     with TemporaryDirectory() as place:
         model, log = arm(Path(place)), goals(duration)
         theirs = Identification(model, ODD, log.commands, PROBLEM.time_step)
         config = SimulationConfig(base="fixed", contact_period=0, time_step=PROBLEM.time_step, settle=SETTLE)
         draws = np.random.default_rng(seed).uniform(0.5, 2.0, (models, 2))
         frictions = [(float(a) * SERVO["coulomb_friction"], float(b) * SERVO["viscous_friction"]) for a, b in draws]
+        commands = log.commands
 
-        def ours(coulomb: float, viscous: float) -> Array:
-            job = Job(_rubbing(model, coulomb, viscous), config, log.commands, duration + 2e-3, REST, times=log.time)
-            (angles,) = servo_angles([job])
-            return angles
+        def ours(several: Sequence[tuple[float, float]], in_lanes: bool) -> list[Array]:
+            played = servo_angles([[Job(_rubbing(model, *f), config, commands, duration + 2e-3, REST, times=log.time)]
+                                   for f in several], in_lanes)
+            return [angles[0] for angles in played if not isinstance(angles, NotCoveredError)]
 
         columns = [model.joints.index(j) for j in theirs.joints]
-        apart = max(float(np.abs(ours(*f)[:, columns] - theirs.played(f, log.time)).max()) for f in frictions[:3])
-        seconds = in_turns({"ours": lambda: [ours(*f) for f in frictions],
+        few = frictions[:3]
+        apart = max(float(np.abs(q[:, columns] - theirs.played(f, log.time)).max()) for f, q in zip(few, ours(few, True)))
+        seconds = in_turns({"alone": lambda: [ours([f], False) for f in frictions], "lanes": lambda: ours(frictions, True),
                             "mujoco": lambda: [theirs.played(f, log.time) for f in frictions]}, repeats)
-    value, quartiles = median_and_quartiles(seconds["mujoco"] / seconds["ours"])
-    return Figure(NAME, MEANING, value, quartiles, details={
-        "log_seconds": duration, "step_seconds": PROBLEM.time_step, "models": models, "turns": repeats,
-        "milliseconds_per_model": {n: float(np.median(s)) / models * 1e3 for n, s in seconds.items()},
-        "largest_difference_deg": float(np.degrees(apart))})
+    details = {"log_seconds": duration, "step_seconds": PROBLEM.time_step, "models": models, "turns": repeats,
+               "milliseconds_per_model": {n: float(np.median(s)) / models * 1e3 for n, s in seconds.items()},
+               "rollouts_per_second": {n: models / float(np.median(s)) for n, s in seconds.items()},
+               "largest_difference_deg": float(np.degrees(apart))}
+    return [Figure(name, meanings[name], *median_and_quartiles(seconds[slow] / seconds[fast]), details=details)
+            for name, (slow, fast, _) in NAMES.items()]
 
 
 def _rubbing(model: RobotModel, coulomb: float, viscous: float) -> RobotModel:

@@ -5,16 +5,14 @@ import pytest
 from tests.gap_worn import CONFIG, HIDDEN, gathered
 from workbench.identify.fitting.fits import Search
 from workbench.identify.rollouts import RolloutEvaluator
-from workbench.robot import puppy_model
-from workbench.simulation import Job, SimulationConfig
-from workbench.simulation.batch import run_job
-from workbench.simulation.compiled.kernel import is_compiled
+from workbench.simulation.compiled import compile_lanes, compile_station
 
 
 def pytest_configure(config):
     """Compiles the station once, on disk, before each of several workers would."""
-    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput") and not is_compiled():
-        run_job(Job(puppy_model(), SimulationConfig(base="fixed", settle=0.0, engine="compiled"), None, 0.01, 0.0))
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        compile_station()
+        compile_lanes()
 
 
 @pytest.fixture(scope="module")

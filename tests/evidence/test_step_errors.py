@@ -32,7 +32,7 @@ def test_an_error_of_the_first_order_is_taken_off_whole_and_each_step_rolled_out
 def angles(take, model, step):
     config = SimulationConfig(base="fixed", settle=0.02, time_step=step, engine="compiled")
     job = Job(model, config, take.commands, TIMES[-1] + 0.1, 0.1, name="x", times=TIMES, start=take.start_state())
-    return servo_angles([job])[0]
+    return servo_angles([[job]])[0][0]
 
 
 @pytest.mark.parametrize("which", [0, 1], ids=["slow", "steps"])

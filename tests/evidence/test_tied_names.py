@@ -153,3 +153,37 @@ def test_names_that_turn_gravity_and_leave_its_size_share_their_probability(name
 def test_a_turned_servo_that_is_told_from_a_tilt_is_no_tie():
     assert turned_by(("zero_offset", "ground_tilt"), alike=("zero_offset",)) is None
     assert turned_by(("ground_tilt", "zero_offset"), alike=("ground_tilt",)).competitive[0].effect == "ground_tilt"
+
+
+@dataclass(frozen=True)
+class Stuck(Scaled):
+    """Far from the nominal law, the rig with an effect answers nothing."""
+
+    def left(self, h):
+        return self.truth if h.effects and np.any(np.abs(h.z) > 1.0) else super().left(h)
+
+
+def test_a_law_that_was_distorted_for_want_of_an_effect_is_not_the_only_start():
+    pool = [candidate(name) for name in ("ground_tilt", "zero_offset")]
+    here = replace(region(pool), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.06),))
+    turned = np.random.default_rng(3).normal(size=1600) * 0.1
+    does = {"torque_at_full_duty": 0.5 * turned} | {f"{c.name}.{c.parameters[0].name}": SHIFT * turned for c in pool}
+    rig = Stuck(None, None, (here,), (start(here.numbers),), None, None, truth=4.0 * SHIFT * turned, does=does)
+    plain = start(here.numbers)
+    bare = lockstep(rig, {0: fitting(here, OPTIONS, plain, 0.1, 9)})[0]
+    assert bare.hypothesis.z[0] > 2.0
+    fit = lockstep(rig, {0: fitting(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
+    ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
+    assert {g.hypothesis.effects[0].name for g in ties.names} == {"ground_tilt", "zero_offset"}
+    assert max(g.discrepancy for g in ties.names) < 0.1 * bare.discrepancy
+
+
+def test_a_name_that_was_found_has_the_size_of_its_finding():
+    here, _, fits = found(math.log(1.3), 0.06, EvidenceOptions(drift=SinceThen()))
+    g = next(g for g in fits.names if g.hypothesis.effects[0].name == "parallel_spring")
+    longer = replace(g, hypothesis=g.hypothesis.at(1.1 * g.hypothesis.theta))
+    for best in (g, longer):
+        told = gravity_over_torque(here, OPTIONS, posterior_of([best], OPTIONS), fits)
+        name = next(n for n in told.names if n.effect == "parallel_spring")
+        (size,) = best.hypothesis.sizes()[0][1]
+        assert name.parameters["stiffness"].value == pytest.approx(best.hypothesis.effects[0].values([size])[0])

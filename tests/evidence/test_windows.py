@@ -37,7 +37,7 @@ def goals():
 def angles(model, restarts=None, commands=None, times=TIMES):
     config = SimulationConfig(base="fixed", settle=0.02, time_step=1e-3, engine="compiled")
     job = Job(model, config, commands or goals(), times[-1] + 2e-3, 0.1, name="x", times=times, restarts=restarts)
-    return servo_angles([job])[0]
+    return servo_angles([[job]])[0][0]
 
 
 def test_states_are_those_of_the_recorded_motion(tmp_path):

@@ -55,7 +55,7 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
     certificate.write(tmp_path)
     read = read_family(gait, model)
     assert read.step_map == certificate.step_map
-    assert read.limits == {"most": 0.15, "most_change": 0.08, "most_side": 0.008, "most_side_change": 0.003}
+    assert (read.most, read.most_change, read.most_side, read.most_side_change) == (0.15, 0.08, 0.008, 0.003)
     assert 1.0 < certificate.step_map.side_gain < 2.0, "a stride to the side is that of a stance, not of a cycle"
     content = json.loads((tmp_path / FILE).read_text())
     (tmp_path / FILE).write_text(json.dumps({**content, "most": 0.5}))

@@ -79,11 +79,11 @@ def test_a_diagnosis_of_servo_logs_that_was_killed_rolls_nothing_out_again(tmp_p
     without = sorted(set(known_effects()) - {"coulomb_friction"})
     plays, played, most = servo_logs.servo_angles, [], np.inf
 
-    def counted(jobs):
+    def counted(models):
         if len(played) >= most:
             raise KeyboardInterrupt
-        played.extend(jobs)
-        return plays(jobs)
+        played.extend(job for jobs in models for job in jobs)
+        return plays(models)
 
     def diagnosed(folder):
         played.clear()

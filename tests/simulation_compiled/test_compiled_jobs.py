@@ -64,8 +64,8 @@ def test_angles_alone_are_those_of_whole_jobs_whatever_ran_before(robot):
 
     def angles(step: float) -> np.ndarray:
         config = replace(config_for("fixed"), engine="compiled", time_step=step)
-        (q,) = servo_angles([Job(robot, config, commands, 1.0, times=TIMES[2:], lead=0.0, start=(np.zeros(15), np.zeros(15)))])
-        return q
+        job = Job(robot, config, commands, 1.0, times=TIMES[2:], lead=0.0, start=(np.zeros(15), np.zeros(15)))
+        return servo_angles([[job]])[0][0]
 
     def alone(step: float) -> np.ndarray:
         config = replace(config_for("fixed"), engine="compiled", time_step=step)
@@ -174,7 +174,7 @@ def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robo
 @pytest.mark.parametrize("known", [True, False])
 def test_the_station_is_compiled_ahead_unless_it_was_before(known, monkeypatch):
     played = []
-    monkeypatch.setattr(station, "is_compiled", lambda: known)
+    monkeypatch.setattr(station, "is_compiled", lambda *_: known)
     monkeypatch.setattr(station, "run_compiled", played.append)
     assert station.compile_station() is not known
     assert len(played) == (not known)

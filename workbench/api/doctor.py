@@ -63,10 +63,11 @@ class Health:
 def compile_rollouts() -> None:
     """Compiles the station, where numba is installed and this has not been done; a warning says that it takes a minute."""
     try:
-        from workbench.simulation.compiled import compile_station
+        from workbench.simulation.compiled import compile_lanes, compile_station
     except ImportError:
         return  # `examine` reports it
     compile_station()
+    compile_lanes()
 
 
 def examine(defaults: Path) -> Health:

@@ -86,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
     certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
     if certified:
-        options = replace(options, **certified.limits)
+        options = replace(options, most=certified.most, most_change=certified.most_change, most_side=certified.most_side,
+                          most_side_change=certified.most_side_change)
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fit_map(args, family, progress)

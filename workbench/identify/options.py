@@ -41,6 +41,9 @@ class ProblemOptions:
     """Of the polynomial through them: over so long a servo's acceleration changes."""
     states_kept: int = 256
     """Takes and horizons of which states are kept, as they are played again and again."""
+    together: int = 64
+    """Requests for servo logs that a thread plays at once: of several structures, each with enough robots for full lanes. What
+    was played is kept only after all of them."""
     loaded: float = 1.0
     """Torque of gravity, in dry frictions, from which on a joint is loaded: friction holds against less, so that nothing moves in
     its gear."""

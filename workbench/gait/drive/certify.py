@@ -86,11 +86,6 @@ class FamilyCertificate:
         """Whether every limit is kept."""
         return not self.problems
 
-    @property
-    def limits(self) -> dict[str, float]:
-        """As `DriveOptions` takes them: nothing beyond the turns that were played."""
-        return {name: getattr(self, name) for name in LIMITS}
-
     def summary(self) -> str:
         """In a few lines, for a person."""
         d, deg = self.draws, np.degrees
@@ -180,8 +175,8 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
         step = content["step_map"]
         numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
         step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
-        found = FamilyCertificate(*(content[name] for name in LIMITS), step_map, content["draws"], content["gait"],
-                                  content["model_sha256"], tuple(content["problems"]))
+        told: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
+        found = FamilyCertificate(**told, step_map=step_map, problems=tuple(content["problems"]))
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
     if found.model_sha256 != model.sha256:

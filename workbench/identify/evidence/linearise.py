@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
-from workbench.identify.evidence.fit import Asks, Fitted, judged
+from workbench.identify.evidence.fit import Asks, Fitted, judged, slopes
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
@@ -70,6 +70,13 @@ def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
     along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
     return best_of_each([_best_along(region, options, f, probes) for probes in along])
+
+
+def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:
+    """The same of a hypothesis as it stands, without a fit of it."""
+    (r,) = yield [h]
+    there = judged(region, options, h, r, (yield from slopes(options, h, r)))
+    return there, (yield from linearised(region, options, there))
 
 
 def ways(probes: Sequence[Probe]) -> list[list[Probe]]:

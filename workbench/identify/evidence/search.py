@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, slopes, without
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
-from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, to_be_fitted
+from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, linearised_around, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.fitting.levenberg_marquardt import together
@@ -190,9 +190,7 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
     h = start(region.numbers)
     if not len(h.theta):
         return []
-    (r,) = yield [h]
-    there = judged(region, options, h, r, (yield from slopes(options, h, r)))
-    moves = yield from linearised(region, options, there)
+    there, moves = yield from linearised_around(region, options, h)
     return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 
 

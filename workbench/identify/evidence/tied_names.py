@@ -10,13 +10,14 @@ import numpy as np
 
 from workbench.identify.conclusions import estimates
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side
-from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain
-from workbench.identify.evidence.linearise import linearised
+from workbench.identify.evidence.hypothesis import FAR, Hypothesis, Uncertain
+from workbench.identify.evidence.linearise import linearised, linearised_around
 from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior
 from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.search import with_better
 from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque, competes
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.findings import Alternative, Estimate, Finding
@@ -90,12 +91,23 @@ def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Tie
         torque = yield from fitting(region, options, alone, f.discrepancy, options.iterations)
         torque = yield from polished(region, options, torque)
     without = Hypothesis(told.numbers, tuple(c for c, _ in rest), np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)]))
-    bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
-    moves = yield from linearised(told, options, bare)
-    fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
-    fits = yield from side_by_side([polished(told, options, g) for g in fits])
+    fits = yield from _each_alone(told, options, without, f)
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
     return TieFits(torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
+
+
+def _each_alone(told: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
+    """The likeliest fit of each candidate in addition to a hypothesis, from three starts: the law fitted without it, which is
+    distorted for want of it (a zero goes as far as it may where gravity leans); the law as it stands; and that of the fit f,
+    which is not distorted where it has another of the candidates."""
+    bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
+    moves = list((yield from linearised(told, options, bare)))
+    as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, told.numbers)]
+    for z in (without.z, np.clip(as_fitted, -FAR, FAR)):
+        moves += (yield from linearised_around(told, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
+    fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    fits = yield from side_by_side([polished(told, options, g) for g in fits])
+    return list(with_better({}, fits).values())
 
 
 def shared_by_tie(f: Finding, told: GravityOverTorque | None) -> Finding:
@@ -121,6 +133,11 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
     return [replace(n, sd=min(n.sd, drift.of(n.name))) if n.name in TORQUES else n for n in numbers]
 
 
+def _is_same_model(a: Hypothesis, b: Hypothesis) -> bool:
+    """Whether two hypotheses differ in their sizes alone, and end with the same effect."""
+    return (a.key, a.numbers, a.effects[-1:]) == (b.key, b.numbers, b.effects[-1:])
+
+
 def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None,
                         weighed: bool = False) -> GravityOverTorque | None:
     """The tie as it is reported; None where nothing of it has changed, or where an effect that could look like one of its effects
@@ -133,9 +150,10 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
         return None
     names = []
     for g in fits.names:
-        c, x = g.hypothesis.sizes()[-1]
-        own, tie = g.hypothesis.slices()[-1], as_torque(region, options, g, c)
-        formal = g.covariance(region, options)[own, own]
+        shown = p.best if _is_same_model(p.best.hypothesis, g.hypothesis) else g  # a name that was found: its finding's size
+        c, x = shown.hypothesis.sizes()[-1]
+        own, tie = shown.hypothesis.slices()[-1], as_torque(region, options, shown, c)
+        formal = shown.covariance(region, options)[own, own]
         covariance = formal if tie is None else tie.covariance(formal, x)
         names.append(TiedName(c.name, c.where, estimates(c, x, covariance), c.effect.sentence(c.spec(x)),
                               fits.behind(g)))

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import joblib
@@ -19,7 +20,7 @@ from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollouts.captured import Rollout, channels_stream
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
-from workbench.identify.rollouts.servo_logs import block_angles, frames, is_log, question_angles
+from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
@@ -120,18 +121,19 @@ class RolloutEvaluator:
                 for by_take, here in zip(keys, covered)]
 
     def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
-        """Angles of logs, by question, each as soon as those before it are there."""
-        wanted = [(q, tuple(takes)) for q, takes in asked]
-        rolled = partial(question_angles, self.evidence, self.config)
-        if self.n_jobs == 1 or len(asked) < 2:
-            yield from map(rolled, wanted)
+        """Angles of logs, by question, a block of them as soon as those before it are there."""
+        wanted, rolled = [(q, tuple(takes)) for q, takes in asked], partial(log_angles, self.evidence, self.config)
+        size = max(1, min(PROBLEM.together, -(-len(wanted) // self.n_jobs)))
+        blocks = (wanted[k:k + size] for k in range(0, len(wanted), size))
+        if self.n_jobs == 1 or len(wanted) < 2:
+            yield from chain.from_iterable(map(rolled, blocks))
             return
         if on_cluster():
-            yield from in_blocks(partial(block_angles, self.evidence, self.config), wanted, self.n_jobs)
+            yield from in_blocks(rolled, wanted, self.n_jobs)
             return
         with ThreadPoolExecutor(self.n_jobs) as pool:  # kernels hold no lock
             try:
-                yield from pool.map(rolled, wanted)
+                yield from chain.from_iterable(pool.map(rolled, blocks))
             finally:
                 pool.shutdown(cancel_futures=True)
 

@@ -45,11 +45,20 @@ def _log_config(config: SimulationConfig) -> SimulationConfig:
     return replace(config, base="fixed", settle=SETTLE)
 
 
-def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig, horizon: float = math.inf
-               ) -> list[Array] | None:
-    """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
-    config: base and rest apart, which are a log's. horizon [s]: of windows, each of which starts from the recorded state."""
-    held = _log_config(config)
+def log_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
+               questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
+    """Of each request on some takes the angles (M, c) [rad] at each log's `frames`; None where the compiled station does not know
+    the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one structure
+    play a log together."""
+    held = {q.step: _log_config(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
+    played = servo_angles([_jobs([evidence[i] for i in takes], q.model, held[q.step], q.horizon) for q, takes in questions])
+    return [None if isinstance(angles, NotCoveredError) else
+            [each[:, [q.model.joints.index(j) for j in evidence[i].joints]] for i, each in zip(takes, angles)]
+            for (q, takes), angles in zip(questions, played)]
+
+
+def _jobs(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig, horizon: float) -> list[Job]:
+    """horizon [s]: of windows, each of which starts from the recorded state."""
     models: dict[str, RobotModel] = {}
     jobs = []
     for e in takes:
@@ -57,25 +66,7 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
         as_it_was = spec.conditions
         models.setdefault(as_it_was, spec.robot(model))
         times = e.since[frames(e)]
-        jobs.append(Job(models[as_it_was], held, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
+        jobs.append(Job(models[as_it_was], config, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
                         start=e.take.start_state(),
                         restarts=None if math.isinf(horizon) else recorded_states(e.take, horizon)))
-    try:
-        angles = servo_angles(jobs)
-    except NotCoveredError:
-        return None
-    return [q[:, [model.joints.index(j) for j in e.joints]] for e, q in zip(takes, angles)]
-
-
-def question_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig, question: tuple[RolloutRequest, tuple[int, ...]]
-                    ) -> list[Array] | None:
-    """`log_angles` of a request on some of the takes. config: of the search, whose steps the request counts."""
-    q, takes = question
-    config = replace(config, time_step=q.step * config.time_step)
-    return log_angles([evidence[i] for i in takes], q.model, config, q.horizon)
-
-
-def block_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
-                 questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
-    """The same of several requests, in a worker of a cluster."""
-    return [question_angles(evidence, config, question) for question in questions]
+    return jobs

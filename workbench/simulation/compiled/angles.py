@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from workbench.cache import Cache
 from workbench.simulation.compiled.arrays import Ints, Schedule
+from workbench.simulation.compiled.lanes.together import joint_angles
 from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.station import CompiledJob
+from workbench.simulation.compiled.tables import NotCoveredError
 from workbench.simulation.job import Job
 from workbench.simulation.steady import JointStates
 from workbench.types import Array
@@ -36,18 +38,41 @@ _schedules: Cache[Schedule] = Cache(KEPT)
 _readings: Cache[_Reading] = Cache(KEPT)
 
 
-def servo_angles(jobs: Sequence[Job]) -> list[Array]:
-    """Of each job the angles (M, n) [rad] of the servos at its `times`, as their own sensors tell them, NaN outside the run.
-    Jobs of one model share its arrays. NotCoveredError gives the reason why a job has to be Drake's."""
+def servo_angles(models: Sequence[Sequence[Job]], in_lanes: bool = True) -> list[list[Array] | NotCoveredError]:
+    """For each model, of each of its jobs the angles (M, n) [rad] of the servos at the job's `times`, as their own sensors tell
+    them, NaN outside the run; or the reason why one of the jobs has to be Drake's. Jobs of one model share its arrays. Robots of
+    one structure play together, in lanes (`joint_angles`), where their jobs have the same commands, states to be put to and
+    configuration: the same objects. in_lanes: as there."""
+    made = [_made(jobs) for jobs in models]
+    plays = [(compiled, _schedule(compiled)) for each in made if not isinstance(each, NotCoveredError) for compiled in each]
+    played = iter(joint_angles(plays, in_lanes))
+    out: list[list[Array] | NotCoveredError] = []
+    for each in made:
+        if isinstance(each, NotCoveredError):
+            out.append(each)
+            continue
+        logs = [(compiled, next(played)) for compiled in each]
+        why = next((q for _, q in logs if isinstance(q, NotCoveredError)), None)
+        out.append([_seen(compiled, q) for compiled, q in logs if not isinstance(q, NotCoveredError)] if why is None else why)
+    return out
+
+
+def _made(jobs: Sequence[Job]) -> list[CompiledJob] | NotCoveredError:
     machines: dict[Any, CompiledJob] = {}
     out = []
-    for job in jobs:
-        key = (id(job.model), id(job.config))
-        compiled = machines[key].of(job) if key in machines else CompiledJob(job)
-        machines.setdefault(key, compiled)
-        log = compiled.log(_schedule(compiled))
-        out.append(_read(log.q[:, compiled.machine.servos.joint] - compiled.physics.zero, _reading(compiled, len(log.q))))
+    try:
+        for job in jobs:
+            key = (id(job.model), id(job.config))
+            out.append(machines[key].of(job) if key in machines else CompiledJob(job))
+            machines.setdefault(key, out[-1])
+    except NotCoveredError as why:
+        return why
     return out
+
+
+def _seen(compiled: CompiledJob, q: Array) -> Array:
+    """At the wanted times, of the angles (rows, n) of all joints."""
+    return _read(q[:, compiled.machine.servos.joint] - compiled.physics.zero, _reading(compiled, len(q)))
 
 
 def _read(rows: Array, reading: _Reading) -> Array:

@@ -21,7 +21,8 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "fastmath": {"contract
 """No GIL; nothing is allocated, so nothing is counted; a product and a sum may be one instruction, with one rounding, but nothing
 is taken to be finite; 1/0 is infinity."""
 _SOURCES = ("arrays", "contact", "kernel", "links", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
-            "../../servo/tabled", "../../servo/term_bank")
+            "../../servo/tabled", "../../servo/term_bank", *(f"lanes/{name}" for name in (
+                "arrays", "links", "number", "play", "servo", "solve")))
 
 
 @cache
@@ -34,14 +35,16 @@ def cache_folder() -> Path:
     return Path(os.environ.get("NUMBA_CACHE_DIR") or user) / f"compiled-{digest.hexdigest()[:16]}"
 
 
-_found = False
+RUN, LANES = "run.run", "play.play_lanes"
+"""Kernels by file and name: of one robot, and of several held ones."""
+_found: set[str] = set()
 
 
-def is_compiled() -> bool:
+def is_compiled(kernel: str = RUN) -> bool:
     """Whether this version's code was compiled on this machine before: else the first run takes a minute longer."""
-    global _found
-    _found = _found or any(cache_folder().rglob("run.run*.nbc"))
-    return _found
+    if kernel not in _found and any(cache_folder().rglob(f"{kernel}*.nbc")):
+        _found.add(kernel)
+    return kernel in _found
 
 
 def part(function: F) -> F:

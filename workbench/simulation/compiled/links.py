@@ -70,7 +70,7 @@ def _body_contacts(tree: Tree, shapes: Shapes, state: State, dt: float, a: int, 
                 count = _add_contact(tree, shapes, state, dt, s, t, sx, sy, sz, x, y, z, count, w)
             elif shapes.pair[t, s] >= 0:
                 count = _add_contact(tree, shapes, state, dt, t, s, tx, ty, tz, -x, -y, -z, count, w)
-            elif _shapes_touch(shapes, s, t, x, y, z, w):
+            elif shapes_touch(shapes, s, t, x, y, z, w):
                 return UNKNOWN
             if count == UNKNOWN:
                 return UNKNOWN
@@ -91,7 +91,7 @@ def _add_contact(tree: Tree, shapes: Shapes, state: State, dt: float, ball: int,
     """Contact number `count`, if the ball whose middle is at (x, y, z), and (dx, dy, dz) from the other's, touches the other."""
     n, o = tree.parent.shape[0], 6 if tree.free else 0
     a, b = shapes.body[ball], shapes.body[other]
-    distance, nx, ny, nz = _outside(shapes, other, dx, dy, dz, w)
+    distance, nx, ny, nz = outside(shapes, other, dx, dy, dz, w)
     depth = shapes.radius[ball] - distance
     if depth <= 0.0:
         return count
@@ -151,7 +151,7 @@ def _add_velocities(tree: Tree, c: int, last: int, sign: float, x: float, y: flo
 
 
 @part
-def _outside(shapes: Shapes, t: int, x: float, y: float, z: float, w: Work) -> Four:
+def outside(shapes: Shapes, t: int, x: float, y: float, z: float, w: Work) -> Four:
     """How far outside shape t, a ball, a box or a cylinder, the point is that is (x, y, z) from its middle, and the direction
     away from the nearest point, in W; not positive within."""
     if shapes.radius[t] > 0.0:
@@ -180,7 +180,7 @@ def _past(x: float, half: float) -> float:
 
 
 @part
-def _shapes_touch(shapes: Shapes, s: int, t: int, x: float, y: float, z: float, w: Work) -> bool:
+def shapes_touch(shapes: Shapes, s: int, t: int, x: float, y: float, z: float, w: Work) -> bool:
     """Whether shapes whose middles are (x, y, z) apart may touch; spheres, else their boxes."""
     if shapes.radius[s] > 0.0 and shapes.radius[t] > 0.0:
         apart = shapes.radius[s] + shapes.radius[t]

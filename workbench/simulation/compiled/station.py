@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
-from threading import Event, Lock, get_ident
+from threading import Lock, get_ident
 from typing import TypeVar
 
 import numpy as np
@@ -18,7 +18,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
 from workbench.simulation.compiled.arrays import Log, Schedule, State, Work, work_for
-from workbench.simulation.compiled.kernel import is_compiled
+from workbench.simulation.compiled.kernel import RUN, is_compiled
 from workbench.simulation.compiled.machine import Machine, machine_of
 from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
@@ -32,7 +32,8 @@ from workbench.simulation.structure import Structure
 T = TypeVar("T")
 ENDED = {TOUCHED: "shapes touch that are neither a foot on the floor nor a sphere on another link"}
 """Why a run was given up, by how it ended; any other way, Drake shall say."""
-_first, _ran = Lock(), Event()
+_first = Lock()
+_ran: set[str] = set()
 
 
 def covers(job: Job) -> str | None:
@@ -49,21 +50,21 @@ def run_compiled(job: Job) -> Take:
     return announced(CompiledJob(job).take)
 
 
-def announced(play: Callable[[], T]) -> T:
-    """What `play` returns; before the first run on a machine, says that the station is being compiled."""
-    if is_compiled() or _ran.is_set():
+def announced(play: Callable[[], T], kernel: str = RUN) -> T:
+    """What `play` returns; before the first run of this kernel on a machine, says that the station is being compiled."""
+    if is_compiled(kernel) or kernel in _ran:
         return play()
     with _first:  # of several threads one compiles and says so, the others wait for it
-        if not (is_compiled() or _ran.is_set()):
+        if not (is_compiled(kernel) or kernel in _ran):
             logging.getLogger(__name__).warning("compiling the station, once for this version and machine (a minute) ...")
         try:
             return play()
         finally:
-            _ran.set()
+            _ran.add(kernel)
 
 
 def compile_station() -> bool:
-    """Compiles the station unless this machine has it compiled; whether there was anything to do."""
+    """Compiles the kernel of one robot unless this machine has it compiled; whether there was anything to do."""
     if is_compiled():
         return False
     run_compiled(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0))
@@ -153,23 +154,40 @@ class CompiledJob:
 
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
-        config, plan = self.config, self.plan
         thread = get_ident()
         if thread not in self._work:
             self._work[thread] = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
         work = self._work[thread]
-        if not self._settled:
-            self._settled.append(self.at_rest(work))
+        if not self.is_settled:
+            self.settle(self.at_rest(work))
+        log = self._log(self.rows)
+        self.play(schedule, self.begin(), log, work)
+        return log
+
+    @property
+    def rows(self) -> int:
+        """Of the log."""
+        return rows_of(self.config, self.plan.lead + self.plan.duration)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the robot's rest is known, from this job or another of the same model."""
+        return bool(self._settled)
+
+    def settle(self, rest: State) -> None:
+        """Makes this the robot's rest."""
+        self._settled.append(rest)
+
+    def begin(self) -> State:
+        """The state of a robot that has settled before the job's first step."""
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._set_start(Start(*self.job.start), state)
-        log = self._log(rows_of(config, plan.lead + plan.duration))
-        self.play(schedule, state, log, work)
-        return log
+        return state
 
     def at_rest(self, work: Work) -> State:
         """The robot at rest in neutral, before the first command."""
-        state = self._rest()
+        state = self.neutral()
         stand(*self.machine, state, work)
         self.play(settling(self.config, len(self.model.joints)), state, self._log(0), work)
         if self.free:
@@ -189,7 +207,8 @@ class CompiledJob:
         return Log(q=np.empty((rows, n)), v=np.empty((rows, n)), base=np.empty((rows, 7)), torque=np.empty((whole, m)),
                    force=np.empty((forces, s, 3)))
 
-    def _rest(self) -> State:
+    def neutral(self) -> State:
+        """All joints at zero, before anything moves."""
         n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.tree.path)
         return State(base=np.array([1.0, 0, 0, 0, 0, 0, 0]), q=np.zeros(n), v=np.zeros(nv), reference=np.zeros(m),
                      goal=self.physics.zero.copy(), lagging=np.zeros(m), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),

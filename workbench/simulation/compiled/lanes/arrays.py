@@ -1,0 +1,151 @@
+"""Data of several robots of one structure: arrays as in `compiled.arrays`, with the lane as a last axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.simulation.compiled.arrays import Ints, Servos, State, Tree
+from workbench.simulation.compiled.lanes.number import LANES
+from workbench.types import Array
+
+
+class LaneServos(NamedTuple):
+    """As `Servos`. terms, varies: in any lane; lags: whether any goal does. Of those a lane lacks, a number changes nothing."""
+
+    joint: Ints
+    terms: bool
+    varies: bool
+    lags: bool
+    zero: Array
+    gain: Array
+    margin: Array
+    punch: Array
+    full_torque: Array
+    back_emf: Array
+    coulomb: Array
+    derivative: Array
+    ramp: Array
+    lag: Array
+    most: Array
+    ceiling: Array
+    supply: Array
+    rubbing: Array
+    backwards: Array
+    bend: Array
+    fade: Array
+    sag: Array
+    sticking: Array
+    speed: Array
+    still: Array
+    still_speed: Array
+    lopsided: Array
+
+
+class Room(NamedTuple):
+    """As `Work`. active (g,): 1 where a tree of the forest has friction or limits; limit_v: minus infinity of a limit that is
+    far. lane_R (n+1, 3, 3): rotations of bodies of one lane, without an axis of lanes."""
+
+    R: Array
+    p: Array
+    S: Array
+    mass: Array
+    moment: Array
+    inertia: Array
+    V: Array
+    A: Array
+    F: Array
+    M: Array
+    H: Array
+    force: Array
+    v_star: Array
+    v_next: Array
+    momentum: Array
+    momentum_star: Array
+    gradient: Array
+    scale: Array
+    dv: Array
+    dp: Array
+    brake_gain: Array
+    limit_R: Array
+    limit_v: Array
+    active: Array
+    push: Array
+    motor: Array
+    relief: Array
+    lane_R: Array
+
+
+_SHARED = ("free", "parent", "path", "row", "group", "pull")
+"""Of a tree, the same in all lanes."""
+_OF_SERVOS = ("zero", "gain", "margin", "punch", "full_torque", "back_emf", "coulomb", "derivative", "ramp", "lag", "most",
+              "ceiling", "supply", "rubbing", "backwards", "bend")
+_BY_TERM = {"sag": 0.0, "sticking": 0.0, "speed": 1.0, "still": 0.0, "still_speed": 1.0, "lopsided": 0.0}
+"""Numbers by term, and those of a term that changes nothing."""
+
+
+def room(*shape: int) -> Array:
+    """Zeros (*shape, LANES), placed as kernels need them."""
+    count = int(np.prod(shape)) * LANES
+    raw = np.zeros(count + LANES)
+    begin = (-raw.ctypes.data // raw.itemsize) % LANES
+    return raw[begin:begin + count].reshape(*shape, LANES)
+
+
+def in_lanes(values: Sequence[Any]) -> Array:
+    """Arrays of one shape, up to LANES of them, side by side; the last one also in the lanes that are left over."""
+    first = np.asarray(values[0])
+    out = room(*first.shape)
+    for i, value in enumerate(values):
+        out[..., i] = value
+    out[..., len(values):] = np.asarray(values[-1])[..., None]
+    return out
+
+
+def trees_in_lanes(trees: Sequence[Tree]) -> Tree:
+    """Of one structure."""
+    numbers: dict[str, Any] = {name: in_lanes([getattr(t, name) for t in trees]) for name in Tree._fields if name not in _SHARED}
+    return trees[0]._replace(**numbers)
+
+
+def servos_in_lanes(servos: Sequence[Servos]) -> LaneServos:
+    """Of as many servos on the same joints, without tables."""
+    numbers = {name: in_lanes([getattr(s, name) for s in servos]) for name in _OF_SERVOS}
+    for name, nothing in _BY_TERM.items():
+        values = [getattr(s, name) for s in servos]
+        most = max(len(v) for v in values)
+        numbers[name] = in_lanes([np.concatenate([v, np.full((most - len(v), *v.shape[1:]), nothing)]) for v in values])
+    return LaneServos(joint=servos[0].joint, terms=any(s.terms for s in servos), varies=any(s.varies for s in servos),
+                      lags=any(bool(s.lag.any()) for s in servos), fade=in_lanes([np.array([s.fade]) for s in servos]), **numbers)
+
+
+def states_in_lanes(states: Sequence[State]) -> State:
+    """That differ in numbers, but not in which servos are on or whether there was a step."""
+    numbers = ("q", "v", "reference", "goal", "lagging", "reach", "memory")
+    return State(base=states[0].base, on=states[0].on.copy(), stepped=states[0].stepped.copy(),
+                 **{name: in_lanes([getattr(s, name) for s in states]) for name in numbers})
+
+
+def state_of_lane(states: State, i: int) -> State:
+    """A lane's own."""
+    own: dict[str, Any] = {name: np.ascontiguousarray(a[..., i]) for name, a in zip(State._fields, states)
+                           if name not in ("base", "on", "stepped")}
+    return State(base=states.base.copy(), on=states.on.copy(), stepped=states.stepped.copy(), **own)
+
+
+def room_for(tree: Tree, servos: LaneServos) -> Room:
+    """For runs of robots of a structure."""
+    n, m = len(tree.parent), len(servos.joint)
+    groups = int(tree.group.max(initial=0)) + 1
+    shapes: dict[str, tuple[int, ...]] = {
+        "R": (n + 1, 3, 3), "p": (n + 1, 3), "S": (n, 6), "mass": (n + 1,), "moment": (n + 1, 3), "inertia": (n + 1, 6),
+        "V": (n + 1, 6), "A": (n + 1, 6), "F": (n + 1, 6), "M": (n, n), "H": (n, n), "limit_v": (n, 2), "active": (groups,),
+        "push": (m,), "motor": (m,), "relief": (m,)}
+    wide = {name: room(*shapes.get(name, (n,))) for name in Room._fields if name != "lane_R"}
+    return Room(lane_R=np.zeros((n + 1, 3, 3)), **wide)
+
+
+Lost = NDArray[np.bool_]
