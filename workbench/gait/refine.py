@@ -101,11 +101,11 @@ def gauss_newton(evaluator: Evaluator, shape: GaitShape, options: RefineOptions,
         goal = Goal.of(evaluator, shape, options)
         counted = f"{basis.size} numbers on {len(goal.robots)} robots"
         progress(f"refining: step {iteration + 1} of {options.iterations}, {counted}", None)
-        zero = np.zeros(basis.size)
-        r, *probed = goal.residuals([basis.shape(x) for x in (zero, *(options.probe * np.eye(basis.size)))])
+        probes: Array = options.probe * np.eye(basis.size)
+        r, *probed = goal.residuals([shape, *(basis.shape(x) for x in probes)])
         J = np.stack([(p - r) / options.probe for p in probed], axis=1)
         steps = [-np.linalg.solve(J.T @ J + damping * np.eye(basis.size), J.T @ r) for damping in DAMPING]
-        points = [basis.shape(share * step) for step in steps for share in SHARES]
+        points = [basis.shape(np.asarray(share * step, float)) for step in steps for share in SHARES]
         tried = goal.residuals(points)
         best = min(range(len(tried)), key=lambda k: float(tried[k] @ tried[k]))
         if tried[best] @ tried[best] >= r @ r:
