@@ -13,7 +13,7 @@ from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
 from workbench.gait.feasibility import STANDING, out_of_reach
 from workbench.gait.finalists import Screening, finalists
-from workbench.gait.limits import GaitLimits
+from workbench.gait.limits import GaitLimits, binding
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of
 from workbench.gait.refine import RefineOptions
@@ -174,6 +174,12 @@ def test_finalists_are_tried_one_after_the_other_on_fresh_robots_until_one_holds
     assert second.shape == fast
     assert len(second.draws) == 3
     assert {m.name for m in second.margins} >= {"tilt", "tilt over draws", "slip over draws", "speed of the worse half of draws"}
+    hurried = replace(lax, limits=replace(limits, back=0.1))
+    alone = replace(found, best=begun[1], others=())
+    (early,) = finalists(machine, hurried, alone, fresh, Screening((1, 3)), brief, None, 1, quiet)
+    assert not early.good
+    assert early.draws == ()  # not back in its cycle soon enough: it meets no others
+    assert binding(early.margins).name == "way back to its cycle"
 
 
 def test_the_bundled_ensemble_draws_what_it_says(machine, tmp_path):

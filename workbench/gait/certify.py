@@ -16,7 +16,7 @@ from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
 from workbench.gait.draws import draw_margins, slip_margin
 from workbench.gait.draws import summary as draw_summary
-from workbench.gait.examine import CertifyOptions, Examiner, NominalRun, OtherEngine
+from workbench.gait.examine import CertifyOptions, Examiner, NominalRun, OtherEngine, vendor_table
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.limit_cycle import LimitCycle
 from workbench.gait.limits import contact_margin, return_margin, run_margins, table_margins, violation
@@ -30,9 +30,8 @@ from workbench.gait.second_engine import margins as engine_margins
 from workbench.gait.second_engine import summary as engines_summary
 from workbench.gait.straighten import PROBED, Straightener, summary_of_straightened, trim_margin, turn_response
 from workbench.gait.table import GaitTable
-from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
-from workbench.robot import GRAVITY, RobotModel, data_file
+from workbench.robot import GRAVITY, RobotModel
 from workbench.types import Progress
 
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
@@ -70,7 +69,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     conditioned = () if other is None else conditions()
     work += [] if other is None else [(f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned]
     work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
-    work += [("back to its cycle", examiner.limit_cycle, (_vendor_table(machine),))] if options.watched else []
+    work += [("back to its cycle", examiner.limit_cycle, (vendor_table(machine.model),))] if options.watched else []
     work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
     work += [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener]
     results = _all(work, options.n_jobs, progress)
@@ -138,14 +137,6 @@ def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]]
     apart = np.array([request.progress(b) - request.progress(a) for a, b in checks])
     return {"count": len(checks), "seconds": options.checked_seconds, "step s": options.checked_step,
             "speed apart, RMS": float(np.sqrt((apart**2).mean()))}
-
-
-def _vendor_table(machine: GaitMachine) -> PoseTable | None:
-    """The ROBOTIS walk, as another table to come from; None for a robot that cannot play it."""
-    try:
-        return load_motion(data_file("robotis_walk.csv"), machine.model).as_table()
-    except InputError:
-        return None
 
 
 def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> Steadiness:

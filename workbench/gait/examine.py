@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
+from workbench.files import InputError
 from workbench.files.option_checks import check_choice, check_positive, check_whole
 from workbench.gait.draws import Drawn, drawn
 from workbench.gait.feet import FeetMeasure, feet_measure
@@ -22,9 +23,9 @@ from workbench.gait.rollouts import Rollouts
 from workbench.gait.second_engine import Condition, Pair
 from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
-from workbench.motion import Commands, PoseTable
+from workbench.motion import Commands, PoseTable, load_motion
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.types import Array
 
@@ -192,6 +193,14 @@ class Examiner:
         commands = self.table.commands(self.cycles(seconds), whole=True)
         end = self._walked_until(seconds) if rest is None else commands.end + rest
         return Job(model, config, commands, end, LEAD, name=name)
+
+
+def vendor_table(model: RobotModel) -> PoseTable | None:
+    """The ROBOTIS walk, as another table from which a gait is entered; None for a robot that cannot play it."""
+    try:
+        return load_motion(data_file("robotis_walk.csv"), model).as_table()
+    except InputError:
+        return None
 
 
 def _tilt(take: Take) -> Array:

@@ -88,7 +88,7 @@ def _undo_zero_shift(channels: dict[str, np.ndarray], log: JointLog) -> tuple[Jo
 def _blank_released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
     """Blanks the positions of a joint where it does not depend on its goals, and reports that."""
     name = f"position.{log.name}"
-    out = []
+    out = list[str]()
     for first, end in lets_go(log):
         at, to_end = int(log.rows[first]), end == len(log.rows)
         last = len(recording.time) - 1 if to_end else int(log.rows[end]) - 1
