@@ -15,9 +15,9 @@ from workbench.identify.rollouts.servo_logs import is_log
 from workbench.robot import RobotModel
 
 HELD = "the base was held in every take"
-NO_CAMERA = "only cameras see it, and the takes are servo logs"
-NO_COMMAND = "these servos and commands never bring it out"
-NO_START = "a later start looks the same, and no take says when it began"
+NO_CAMERA = "only cameras can see it, and the takes are servo logs"
+NO_COMMAND = "these servos and commands never excite it"
+NO_START = "a later start of the take looks the same, and no take states when it started"
 NO_LOAD = "gravity loads none of the joints"
 
 

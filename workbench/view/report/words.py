@@ -51,7 +51,7 @@ def hidden_effects(why: Mapping[str, str]) -> list[str]:
     by_reason: dict[str, list[str]] = {}
     for effect, reason in why.items():
         by_reason.setdefault(reason, []).append(effect.replace("_", " "))
-    return [f"**Cannot show here**, because {reason}: {join_words(effects)}." for reason, effects in by_reason.items()]
+    return [f"**Not observable here**, because {reason}: {join_words(effects)}." for reason, effects in by_reason.items()]
 
 
 def _with_rival(f: Finding, tied: Sequence[GravityOverTorque]) -> str:
