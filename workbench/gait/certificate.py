@@ -22,8 +22,8 @@ from workbench.robot import RobotModel
 NAME = "certificate.json"
 MARK = "made by workbench optimize; its certificate is certificate.json beside it"
 """First line of a motion that has a certificate."""
-CLAIM = "All numbers are the model's: a speed here is a claim about the model until a robot has walked it."
-PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went 37."
+CLAIM = "All numbers are simulated: until a robot has walked it, a speed is a claim about the model."
+PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk covers 15.6 cm in six seconds; the robot of the thesis covered 37 cm."
 
 
 ADDED = ("asked",)

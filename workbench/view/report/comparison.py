@@ -58,14 +58,15 @@ def headline(comparison: Comparison) -> str:
     take, joint, worst = max(over, key=lambda found: found[2].over_noise)
     joints = len({j for _, j, _ in over})
     return (f"{_count(joints, 'joint')} differ{'s' if joints == 1 else ''} by more than noise and numerical error; the worst is "
-            f"{joint} in {take.name}: {_degrees(worst.error)} RMS, {worst.over_noise:.1f} times both.")
+            f"{joint} in {take.name}: {_degrees(worst.error)} RMS, {worst.over_noise:.1f} times that level.")
 
 
 def _summary(comparison: Comparison) -> str:
     problems = sum(len(t.recorded.problems) for t in comparison.takes)
-    text = ("Errors are RMS after the first command. Noise is the recording's at rest before it; the numerical floor is the same "
-            "rollout with the step halved and quartered. The spread between contact models is stated separately.")
-    return text + (f" {_count(problems, 'remark')} on the recordings: see each take." if problems else "")
+    text = ("Errors are RMS values after the first command. Noise is measured at rest before it; the numerical floor is the "
+            "change of the rollout when the step is halved and quartered. The spread between contact models is listed "
+            "separately.")
+    return text + (f" {_count(problems, 'remark')} on the recordings; see each take." if problems else "")
 
 
 def _key_numbers(comparison: Comparison) -> list[tuple[str, str, str]]:
@@ -93,7 +94,7 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
     """Everything about one take, including its 3D replay, which is written to `replay`."""
     write_replay(replay, model, take.simulated, take.recorded, title=take.name)
     parts: list[Part] = [Picture(joint_errors(take.joints),
-                                 "Error of each joint, with the error that noise and numerics alone would cause.")]
+                                 "Error of each joint, and the error that noise and numerical error alone would cause.")]
     problems = take.recorded.problems
     if problems:
         parts.append(Details(f"{_count(len(problems), 'remark')} on the recording", [Text("\n\n".join(problems))]))
@@ -132,7 +133,8 @@ def _joint_table(take: TakeComparison) -> Table:
         c = take.joints[joint]
         angles = [_number(math.degrees(x), 3) for x in (c.error, c.noise, c.floor, c.spread)]
         rows.append([joint, *angles, _number(c.over_noise, 1), _number(c.correlation, 4), _number(1e3 * c.lag, 1)])
-    header = ["joint", "error [deg]", "noise", "floor", "spread", "error over both", "correlation", "recording later by [ms]"]
+    header = ["joint", "error [deg]", "noise", "floor", "spread", "ratio to noise and floor", "correlation",
+              "lag of the recording [ms]"]
     return Table(header, rows)
 
 
@@ -156,8 +158,8 @@ def _body_table(take: TakeComparison) -> Table:
 
 
 def _about(joint: str, c: Channel) -> str:
-    ratio = f", {c.over_noise:.1f} times noise and floor" if math.isfinite(c.over_noise) else ""
-    lag = f"; the recording is {abs(1e3 * c.lag):.0f} ms {'later' if c.lag > 0 else 'earlier'}" if abs(c.lag) >= 1e-3 else ""
+    ratio = f", {c.over_noise:.1f} times noise and numerical error" if math.isfinite(c.over_noise) else ""
+    lag = f"; the recording {'lags' if c.lag > 0 else 'leads'} by {abs(1e3 * c.lag):.0f} ms" if abs(c.lag) >= 1e-3 else ""
     return f"{joint}: {_degrees(c.error)} RMS{ratio}{lag}."
 
 

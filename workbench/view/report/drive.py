@@ -42,14 +42,14 @@ def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driv
                "turns": closed.turns.tolist(), "sides": closed.sides.tolist()}
     write_whole(folder / "drive.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
-    report = Report("Driven path", f"Way-points passed at {misses} cm; stopped: {closed.reason}.", CLAIM,
-                    provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
+    report = Report("Driven path", f"Distance to each way-point: {misses} cm; stopped: {closed.reason}.", CLAIM,
+                    provenance=Provenance(model.sha256, more=(("errors counted from", f"{SETTLED} m"),)))
     caption = "" if straight is None else "Both runs use the same robot and the same gait."
     report.add(Section("The path", [Picture(driven_path(closed, straight, discs), caption)]))
-    cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
+    cycles = Picture(driven_cycles(closed, most), "Dotted: the maximum turn.")
     report.add(Section("Cycle by cycle", [cycles, _errors(closed, straight)]))
     report.add(Section("The step-to-step map", [_map(step_map), Text(
-        "The scatter of one cycle's heading bounds what any controller that acts once a cycle can reach.")]))
+        "The scatter of the heading from cycle to cycle limits what any controller that acts once per cycle can achieve.")]))
     return [report.write(folder / "report.html"), folder / "drive.json"]
 
 
@@ -66,7 +66,7 @@ def _errors(closed: Driven, straight: Driven | None) -> Table:
             errors = _number(n["largest_lateral_error_m"], 100), _number(n["largest_heading_error_deg"], 1)
             rows.append([name, run.reason, *errors])
     return Table(["robot", "stopped", "largest lateral error [cm]", "largest heading error [deg]"], rows,
-                 f"Errors at the ends of cycles, from {SETTLED} m along the path on.")
+                 f"Errors at the end of each cycle, after the first {SETTLED} m of the path.")
 
 
 def _number(value: object, factor: float) -> str:
@@ -76,10 +76,10 @@ def _number(value: object, factor: float) -> str:
 def _map(m: StepMap) -> Table:
     deg = np.rad2deg
     return Table(["quantity", "value"], [
-        ["heading change per cycle, going straight", f"{deg(m.bias):.2f} deg"],
-        [f"at the largest turn of {m.most:g} rad, same cycle", f"{deg(m.gain * m.most):.1f} deg"],
-        [f"at the largest turn of {m.most:g} rad, next cycle", f"{deg(m.memory * m.most):.1f} deg"],
-        ["to the left, per mm of sideways stride", f"{m.side_gain:.2f} mm"],
+        ["heading change per cycle, without steering", f"{deg(m.bias):.2f} deg"],
+        [f"heading change at the maximum turn of {m.most:g} rad, same cycle", f"{deg(m.gain * m.most):.1f} deg"],
+        [f"heading change at the maximum turn of {m.most:g} rad, next cycle", f"{deg(m.memory * m.most):.1f} deg"],
+        ["lateral motion per mm of sideways stride", f"{m.side_gain:.2f} mm"],
         ["distance per cycle", f"{100 * m.ahead:.1f} cm"],
-        ["scatter of one cycle's heading", f"{deg(m.scatter[0]):.2f} deg"],
-        ["scatter of one cycle's lateral position", f"{1000 * m.scatter[1]:.1f} mm"]])
+        ["scatter of the heading per cycle", f"{deg(m.scatter[0]):.2f} deg"],
+        ["scatter of the lateral position per cycle", f"{1000 * m.scatter[1]:.1f} mm"]])

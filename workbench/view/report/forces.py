@@ -12,9 +12,9 @@ from workbench.dynamics.margins import ServoLoad
 from workbench.robot import GRAVITY, RobotModel
 from workbench.view.figures import base_wrench, joint_torques, servo_margins
 
-_MEASURED = ("sd: from the measurement's noise in angles that are differentiated twice; smoothing, and the distribution of load "
-             "between feet, are not included. A robot that seems to exceed its servos' limits has "
-             "different servos or loads from the model.")
+_MEASURED = ("sd: from the measurement noise, amplified by differentiating the angles twice; smoothing and the distribution of "
+             "load between feet are not included. If a robot appears to exceed its servos' limits, its servos or loads differ "
+             "from the model's.")
 
 
 def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[str, Figure]:
@@ -49,4 +49,4 @@ def _mark(load: ServoLoad) -> str:
     if load.exceeded:
         return "   exceeds the servo's limit"
     negative = not load.feasible and not math.isnan(load.torque_margin)
-    return "   no margin left, or none beyond the noise" if negative else ""
+    return "   no margin left, or none above the noise" if negative else ""

@@ -51,11 +51,11 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
     replay = write_replay(folder / "replay.html", on, take, None if walk is None else walk[0], title="optimised gait").path
     claim = PUPPY_CLAIM if model.description == PUPPY else CLAIM
     report = Report("Optimised gait", _headline(result), claim, _key_numbers(certificate), _provenance(certificate, model))
-    ghost = "" if walk is None else " The ghost is the ROBOTIS walk on the same model, from the same place."
+    ghost = "" if walk is None else " The ghost is the ROBOTIS walk on the same model, started from the same place."
     strip = film_strip(on, take, None if walk is None else walk[0])
     if result.problem:
-        report.add(Section("Not met", [Text(result.problem)]))
-    report.add(Section("The gait", [Replay(replay, "From rest, with the ground's forces." + ghost, strip),
+        report.add(Section("Request not met", [Text(result.problem)]))
+    report.add(Section("The gait", [Replay(replay, "From rest, with contact forces." + ghost, strip),
                                     *_walking(take, on, result.table, walk)]))
     if result.plan is not None:
         report.add(_plan_section(result.plan))
@@ -88,7 +88,8 @@ def _headline(result: Optimized) -> str:
         low = d["speed " + n.unit][1]
         if low is not None:
             five = f"{math.degrees(low):.0f} deg/s" if turns else f"{100 * low:.0f} cm/s"
-            said = f"{request[0].upper()}{request[1:]}: {five} or more on 95 % of the robots drawn, {speed} on the nominal one"
+            said = (f"{request[0].upper()}{request[1:]}: {five} or more on 95 % of the sampled robots, "
+                    f"{speed} on the nominal robot")
         said += f"; of {d['count']} random variants {d['falls'] or 'none'} fell"
     return said + ("." if result.met else "; the request is not met.")
 
@@ -99,18 +100,18 @@ def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
     factor, unit = (180 / math.pi, "deg/s") if turns else (100.0, "cm/s")
     worst = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
     advised = [f"ROBOTIS advises {m.limit:.2f}" for m in certificate.margins if m.advice and m.unit == "N m"]
-    numbers = [("speed", f"{factor * n.speed:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} by the step"),
-               ("limit that binds", worst.name, f"{worst.value:.3g} of {worst.limit:.3g} {worst.unit}, {worst.where}"),
+    numbers = [("speed", f"{factor * n.speed:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} from the time step"),
+               ("binding limit", worst.name, f"{worst.value:.3g} of {worst.limit:.3g} {worst.unit}, {worst.where}"),
                ("largest RMS torque", f"{n.largest_rms:.2f} N m", advised[0] if advised else ""),
                ("electrical power", f"{n.power:.0f} W",
                 f"cost of transport {n.cost_of_transport:.1f}")]
     if d.get("count"):
         lowest, five = d["speed " + n.unit][:2]
-        name, low = ("slowest draw", lowest) if five is None else ("5th percentile of draws", five)
+        name, low = ("slowest sampled robot", lowest) if five is None else ("5th percentile of sampled robots", five)
         numbers.insert(0, (name, f"{factor * low:.1f} {unit}", f"heading {d['heading deg/m RMS']:.1f} deg/m RMS"))
     if e:
-        numbers.append((f"speed kept in {e['name']}", f"{100 * e['speed kept']:.0f} %",
-                        f"heading {e['heading apart deg/m']:+.1f} deg/m apart"))
+        numbers.append((f"speed in {e['name']}", f"{100 * e['speed kept']:.0f} % of Drake's",
+                        f"heading differs by {e['heading apart deg/m']:+.1f} deg/m"))
     return numbers
 
 
@@ -123,15 +124,15 @@ def _walking(take: Take, model: RobotModel, table: GaitTable, walk: tuple[Take, 
     limit = {j: model.servo(j).torque_at_full_duty for j in take.joints}
     busiest = take.joints[int(np.argmax((take.torque**2).mean(axis=0)))]
     return [
-        Picture(body_path(take, others=others), "Path of the body, from above and over time."),
-        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "Stance of each foot, in two seconds of walking."),
+        Picture(body_path(take, others=others), "Path of the body, seen from above and over time."),
+        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "Stance of each foot during two seconds of walking."),
         Picture(phase_portrait(busiest, take.resampled(take.time[(take.since_start > last - 2.0) & (take.since_start < last)])),
-                f"Speed over angle of {busiest}, the most heavily loaded servo, in the same two seconds."),
-        Details("Commanded and reached angles, torques, attitude", [
+                f"Speed over angle of {busiest}, the most heavily loaded joint, in the same two seconds."),
+        Details("Commanded and simulated angles, torques, attitude", [
             Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
-                    "Each joint, commanded (ramp) and reached; the foot's stance is shaded."),
+                    "Angle of each joint, commanded (ramp) and simulated; the stance of its foot is shaded."),
             Picture(joint_torques(take.since_start, take.joints, {"on the link": take.torque}, limit=limit),
-                    "Torque of each joint, and the servo's at full duty."),
+                    "Torque of each joint, and the servo's torque at full duty."),
             Picture(body_attitude(take, others=others))])]
 
 
@@ -140,23 +141,22 @@ def _plan_section(c: PlanComparison) -> Section:
     joints = [[joint, f"{math.degrees(error):.1f}"] for joint, error in c.joints.items()]
     feet = [[foot, f"{1000 * error:.1f}"] for foot, error in c.feet.items()]
     return Section("Planned and simulated", [
-        Text(f"The table has {100 * c.speed:.0f} % of the planned speed. Below, errors are RMS over the cycles after the first, "
-             "between where the plan has each tracked body and where the simulated robot has it, seen from a frame that goes at "
-             "the planned speed."),
-        Picture(plan_and_run(c), "Base and feet over one cycle; simulated: the mean of the cycles."),
+        Text(f"The table reaches {100 * c.speed:.0f} % of the planned speed. Errors are RMS over the cycles after the first, "
+             "between the planned and the simulated pose of each tracked body, in a frame that moves at the planned speed."),
+        Picture(plan_and_run(c), "Base and feet over one cycle, planned and simulated (mean of the cycles)."),
         Table(["tracked body", "position [mm]", "rotation [deg]"], rows),
         Details("Joints and feet", [Table(["joint", "RMS [deg]"], joints), Table(["foot", "RMS [mm]"], feet)])])
 
 
 def _limits_section(certificate: Certificate) -> Section:
     rows = [[m.name, m.where, short(m.value), short(m.limit), m.unit, f"{100 * m.margin:.0f} %",
-             "advice" if m.advice else "kept" if m.use <= 1 else "broken"] for m in certificate.margins]
+             "advice" if m.advice else "met" if m.use <= 1 else "violated"] for m in certificate.margins]
     shown = [rows[certificate.margins.index(m)] for _, m in each(certificate.margins)]
-    header = ["limit", "where", "value", "limit", "unit", "left", ""]
+    header = ["limit", "where", "value", "limit", "unit", "margin", ""]
     return Section("Limits", [
-        Picture(limit_bars(certificate), "The worst joint or place for each limit; above 1 the limit is exceeded. Hatched: "
+        Picture(limit_bars(certificate), "For each limit the worst joint or foot; above 1 the limit is exceeded. Hatched: "
                 "recommended by ROBOTIS, not required here."),
-        Table(header, shown), Details("Every limit of every joint", [Table(header, rows)])])
+        Table(header, shown), Details("All limits of all joints", [Table(header, rows)])])
 
 
 def _draws_section(certificate: Certificate) -> Section:
@@ -164,42 +164,42 @@ def _draws_section(certificate: Certificate) -> Section:
     parts: list[Part] = []
     if d.get("count"):
         incidents = [[str(i["draw"]), i["robot"], i["what"]] for i in d["incidents"]]
-        parts += [Text(f"{d['count']} new random robots, none of which the search used: friction, supply and its sag, masses, a "
-                       f"load, zero offsets, play and latency all at once. {d['falls'] or 'None'} fell; the true share is below "
-                       f"{100 * d['falls at most']:.1f} % (at 95 %)."),
-                  *([Table(["draw", "robot", "what happened"], incidents)] if incidents else []),
-                  Picture(draw_ranges(certificate), "Thick: 5 to 95 % of the robots; thin: all; circle: the median; green: the "
+        parts += [Text(f"{d['count']} newly sampled robots, none of which the search used: friction, supply voltage and its "
+                       f"sag, masses, a load, zero offsets, backlash and latency vary at once. {d['falls'] or 'None'} fell; the "
+                       f"probability of a fall is below {100 * d['falls at most']:.1f} % (at 95 % confidence)."),
+                  *([Table(["sample", "robot", "what happened"], incidents)] if incidents else []),
+                  Picture(draw_ranges(certificate), "Thick line: 5 to 95 % of the robots; thin line: all; circle: median; green: "
                           "nominal robot.")]
     trimmed = d.get("straightened")
     if trimmed and trimmed["after one metre deg/m RMS"] is not None:
         before, one, three = (trimmed[f"{k} deg/m RMS"] for k in ("untrimmed", "after one metre", "after 3 metres"))
-        parts.append(Text(f"Heading over {trimmed['robots']} of them: {before:.1f} deg/m RMS as they are; {one:.1f} after "
-                          f"one recorded metre and one correction by `workbench trim`, {three:.1f} after three."))
+        parts.append(Text(f"Heading drift of {trimmed['robots']} of them: {before:.1f} deg/m RMS without trimming, {one:.1f} "
+                          f"after one recorded metre and one correction by `workbench trim`, {three:.1f} after three."))
     steps = ", ".join(f"{k} {100 * v:.1f}" for k, v in floor["speed"].items())
     unit = "0.01 rad/s" if certificate.nominal.unit == "rad/s" else "cm/s"
-    parts.append(Text(f"Numerical floor: the speed of the nominal robot by step and contact model is {steps} {unit}; heading "
-                      f"differs by {floor['heading deg/m, all']:.1f} deg/m (standard deviation)."))
+    parts.append(Text(f"Numerical floor: speed of the nominal robot for each time step and contact model: {steps} {unit}; "
+                      f"the heading varies by {floor['heading deg/m, all']:.1f} deg/m (standard deviation)."))
     e = certificate.other_engine
-    parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
-                      f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
+    parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed; the heading differs by "
+                      f"{e['heading apart deg/m']:+.1f} deg/m." if e else
                       "Not cross-checked: no second simulator is installed."))
     if e:
         parts.append(Table(["condition", f"speed [{n.unit}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
                            [[k, *(f"{c[key]:.3f}" for key in ("speed", "speed elsewhere")),
                              *(f"{c[key]:+.1f}" for key in ("heading deg/m", "heading elsewhere deg/m"))]
                             for k, c in e["conditions"].items()]))
-    return Section("Random variants of the robot", parts)
+    return Section("Sampled robots", parts)
 
 
 def _way_section(certificate: Certificate) -> Section:
     ways = certificate.ways
     rows = [[name, *(f"{value:.2f}" for value in (part.seconds, part.torque, part.tilt, part.jerk))]
             for name, part in (("start", ways.start), ("gait", ways.gait), ("stop", ways.stop))]
-    said = ("Both are as smooth as the gait itself." if ways.smooth else
-            "Both jerk the robot more than the gait itself does.")
+    said = ("Start and stop are as smooth as the gait itself." if ways.smooth else
+            "Start and stop jerk the robot more than the gait itself does.")
     return Section("Start, stop and return", [
-        Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
-             "to neutral; both are in `gait.csv`, and all numbers here are of the whole motion. " + said),
+        Text("The start leads from neutral through the gait's stance and one cycle of half the amplitude into the gait; the stop "
+             "leads back to neutral. Both are in `gait.csv`, and all numbers here apply to the whole motion. " + said),
         Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows),
         *_cycle_parts(certificate)])
 
@@ -207,15 +207,16 @@ def _way_section(certificate: Certificate) -> Section:
 def _cycle_parts(certificate: Certificate) -> list[Part]:
     """Whether the gait comes back to its cycle, and how much its cycles differ."""
     c = certificate.cycle
-    said = (f"From cycle to cycle heading scatters by {c.heading:.2g} deg and speed by {100 * c.speed:.2g} cm/s (standard "
-            "deviations, nominal robot)")
+    said = (f"From cycle to cycle the heading scatters by {c.heading:.2g} deg and the speed by {100 * c.speed:.2g} cm/s "
+            "(standard deviations, nominal robot)")
     median = c.heading_of_draws
-    parts: list[Part] = [Text(said + ("." if median is None else f"; over draws heading by {median:.2g} deg (median)."))]
+    more = "" if median is None else f"; on the sampled robots the heading scatters by {median:.2g} deg (median)"
+    parts: list[Part] = [Text(f"{said}{more}.")]
     if c.back:
-        never = f"not in {c.watched}"
+        never = f"not within {c.watched}"
         rows = [[entry, "fell" if entry in c.fell else never if n is None else str(n)] for entry, n in c.back.items()]
-        parts.append(Table(["entered", "cycles until it walks as from neutral"], rows,
-                           "Forward and sideways speed and turn of a cycle within a tenth of the settled gait's."))
+        parts.append(Table(["entry or disturbance", "cycles until it walks as from neutral"], rows,
+                           "Criterion: forward and sideways speed and turn of a cycle within a tenth of the settled gait's."))
     return parts
 
 
@@ -226,10 +227,10 @@ def _table_section(table: GaitTable) -> Section:
     numbers = {k: v for k, v in vars(table.shape).items() if k != "offsets"}
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in numbers.items())
     return Section("The table", [
-        Text("The loop; `gait.csv` also contains start and stop. `simulate`, `run`, `play`, `flash` and `export` accept that "
-             "file, and all but the first require `certificate.json` in the same folder."),
+        Text("The table is the loop; `gait.csv` also contains the start and the stop. `simulate`, `run`, `play`, `flash` and "
+             "`export` accept that file, and all except `simulate` require `certificate.json` in the same folder."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
-        Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
+        Details("Moving speeds and gait parameters", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 
 
 def _provenance(certificate: Certificate, model: RobotModel) -> Provenance:

@@ -24,7 +24,8 @@ def comparison_html(comparison: Comparison) -> str:
     """The result in a sentence and, for each take, the joints that differ most."""
     rows = [(take.name, joint, *(_degrees(v) for v in (c.error, c.noise, c.floor)), f"{c.over_noise:.1f}")
             for take in comparison.takes for joint, c in ((j, take.joints[j]) for j in take.joints_by_error()[:SHOWN])]
-    return _paragraph(headline(comparison)) + _table(("take", "joint", "error", "noise", "numerical floor", "times both"), rows)
+    header = ("take", "joint", "error", "noise", "numerical floor", "ratio to noise and floor")
+    return _paragraph(headline(comparison)) + _table(header, rows)
 
 
 def diagnosis_html(diagnosis: Diagnosis) -> str:

@@ -15,8 +15,8 @@ from workbench.view.report.page import Picture, Provenance, Report, Section, Tab
 def torque_report(gaps: Mapping[str, TorqueGap], compared: str, model: RobotModel) -> Report:
     """The page of one log's gap, or of several; compared: their difference in a sentence, or empty."""
     first = next(iter(gaps.values()))
-    report = Report("Torque gap", compared or _headline(first), "Recorded torque less the torque that the model requires for the "
-                    "recorded motion, its base held level.", provenance=Provenance.of(model))
+    report = Report("Torque gap", compared or _headline(first), "Recorded torque minus the torque that the model requires for "
+                    "the recorded motion, with its base held level.", provenance=Provenance.of(model))
     for name, gap in gaps.items():
         rows = [[g.joint, f"{g.recorded:.3f}", f"{g.gap:.3f}", f"{g.mean:+.3f}", f"{g.with_load:.3f}"] for g in gap.joints]
         table = Table(["joint", "recorded", "gap", "mean gap", "gap with the load"], rows, "RMS and mean [N m]")
