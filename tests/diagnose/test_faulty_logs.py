@@ -60,7 +60,7 @@ def test_what_was_set_aside_is_part_of_the_provenance(tmp_path: Path, spoil: Cal
     found = how_logged(takes)
     assert list(found["set_aside"]) == ["slow"]
     (sentence,) = said_aside(found)
-    assert sentence.startswith(f"Set aside in slow: {said}")
+    assert sentence.startswith(f"Corrected or excluded in slow: {said}")
 
 
 @pytest.mark.slow
@@ -76,4 +76,4 @@ def test_a_diagnosis_names_the_hidden_friction_in_spite_of_a_faulty_log(tmp_path
     assert size["low"] < 0.12 < size["high"]
     assert said in capsys.readouterr().out
     assert any(said in line for line in findings["provenance"]["set_aside"]["slow"])
-    assert "Set aside in slow" in (out / "report.html").read_text()
+    assert "Corrected or excluded in slow" in (out / "report.html").read_text()

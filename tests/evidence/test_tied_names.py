@@ -76,7 +76,7 @@ def test_a_known_weight_in_some_takes_leaves_torque_as_the_only_cause():
     assert tied.torque_behind == 0.0
     assert min(n.behind for n in tied.names) > OPTIONS.occam
     assert tied.competitive == ()
-    assert "leave one: all torques of the servo times 1.66" in tied.in_words()
+    assert "leave only one possible cause: all torques of the servo multiplied by 1.66" in tied.in_words()
     assert "`load:`" not in tied.in_words()
 
 
@@ -147,7 +147,7 @@ def test_names_that_turn_gravity_and_leave_its_size_share_their_probability(name
     assert {n.effect for n in told.competitive} == set(names)
     assert told.confidence > 0.9
     assert not told.may_be_torque
-    assert "while gravity over torque is 1.00" in told.change
+    assert "while the ratio of gravity to torque is 1.00" in told.change
 
 
 def test_a_turned_servo_that_is_told_from_a_tilt_is_no_tie():

@@ -46,4 +46,4 @@ def test_what_was_tried_is_sorted_by_how_much_less_likely() -> None:
     assert ["2 times less" in str(row[-1]) for row in rows] == [True, False, False]
     assert "81 times less probable" in str(rows[1][-1])
     assert "more than 1,000,000 times less" in str(rows[2][-1])
-    assert str(SpokenAgainst(7.0)) == "the held-out takes are 1,000 times less probable with it"
+    assert str(SpokenAgainst(7.0)) == "with it, the held-out takes are 1,000 times less probable"

@@ -32,7 +32,8 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
             "fit": {"before": 1.9, "after": 0.12, "unit": "deg"}, "validation": {"before": 2.0, "after": 0.11, "unit": "deg"},
             "evidence": "It shows where the load turns."}],
         "rejected": [{"effect": "coulomb_friction", "where": ["flm"],
-                      "reason": "dead_band(flm) reduces chi squared on the choosing stretches by 900, this one by 40",
+                      "reason": "dead_band(flm) reduces chi squared by 900 on the stretches that decide between effects, "
+                                "this one by 40",
                       "validation": {"before": 2.0, "after": 1.9, "unit": "deg"}},
                      {"effect": "payload", "where": ["body_link"], "reason": str(ScreenedOut(12.0, 310.0))}],
         "unexplained": [{"where": ["frb"], "error": 0.6, "floor": 0.2, "unit": "deg",

@@ -142,7 +142,7 @@ def test_figures_can_be_written_even_where_nothing_was_seen(take: TakeReport, dr
     (Estimate(50.0, 20.0, inf, "N m/rad"), "50 N m/rad (at least 20)"),
     (Estimate(0.1, -inf, 0.3, "N m"), "0.1 N m (at most 0.3)"),
     (Estimate(0.1, -inf, inf, "N m"), "0.1 N m (not bounded by the data)"),
-    (Estimate((0.03, 0.0, 0.04), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3), "m"), "50 mm in all"),
+    (Estimate((0.03, 0.0, 0.04), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3), "m"), "50 mm in magnitude"),
     (Estimate(0.012, 0.01, 0.015, "s"), "12 ms (10 to 15)"),
 ])
 def test_intervals_are_said_as_a_person_would(estimate: Estimate, said: str) -> None:
@@ -161,14 +161,14 @@ def test_a_vector_has_a_row_for_each_component_in_a_unit_that_suits_the_largest(
 
 @pytest.mark.parametrize(("entry", "row"), [
     (Unexplained(("brm",), 0.567, 0.206, "deg", Dependence("sway", "brm", "angle", 0.55)),
-     ["joint brm", "sway", "0.567 deg", "2.8×", "partly with its angle (0.55)"]),
+     ["joint brm", "sway", "0.567 deg", "2.8×", "moderately with its angle (0.55)"]),
     (Unexplained((), 0.00546, 0.00178, "m", Dependence("walk", "forward")),
-     ["how far the body moves", "walk", "5.46 mm", "3.1×", "not with time"]),
+     ["forward motion of the body", "walk", "5.46 mm", "3.1×", "not with time"]),
     (Unexplained(("flm",), 1.0, 0.5, "deg", Dependence("walk", "flm~z", "time", 0.8)),
-     ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "closely with time (0.80)"]),
+     ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "strongly with time (0.80)"]),
     (Unexplained(("frb",), 0.6, 0.2, "deg", ParameterDrift("com_shift", ("frb_link",), "offset", 1.0, 2.0, "m")),
      ["frb", "", "0.6 deg", "3.0×", "offset of centre of mass shift at frb_link would have to change from 1 to 2 m within a "
-                                     "take: something that varies with time may be the cause"]),
+                                     "take: the cause may be something that varies with time"]),
 ])
 def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str]) -> None:
     assert left_row(entry) == row
@@ -180,22 +180,22 @@ def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(mo
     told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
     assert all("The tether force is a vertical pull of 76 g, but without the inertia of a load" in page for page in told.values())
-    assert ["still exceeds noise" in page for page in told.values()] == [False, True]
+    assert ["still has errors above noise" in page for page in told.values()] == [False, True]
 
 
 def test_reasons_name_effects_as_people_do() -> None:
     worse = WorseInPlace("com_shift", ("body_link",), 686.4)
-    assert in_words(worse).startswith("in place of centre of mass shift at body_link it leaves 686 more of chi squared on")
-    assert str(worse).startswith("in place of com_shift(body_link) it leaves 686 more")
-    assert "it leaves only 3 less" in str(replace(worse, behind=-3.2))
+    assert in_words(worse).startswith("in place of centre of mass shift at body_link it leaves chi squared 686 higher")
+    assert str(worse).startswith("in place of com_shift(body_link) it leaves chi squared 686 higher")
+    assert "it leaves chi squared only 3 lower" in str(replace(worse, behind=-3.2))
     other = Outdone("a_plug_in", (), 40.0, 7.0)
-    assert in_words(other) == "a plug in reduces chi squared on the choosing stretches by 40, this one by 7"
+    assert in_words(other) == "a plug in reduces chi squared by 40 on the stretches that decide between effects, this one by 7"
 
 
 def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
     told = next_said(NextExperiment("next_experiment.csv", "free", (("backlash", "dead_band"),), (np.log(150.0),)))
     assert "[next_experiment.csv](next_experiment.csv) with the robot free on the floor" in told
-    assert "backlash from dead band (expected odds of the right name: 150 to 1)" in told
+    assert "backlash from dead band (expected odds in favour of the correct effect: 150 to 1)" in told
     assert "more than 1000 to 1" in next_said(NextExperiment("n.csv", "fixed", (("a", "b"),), (800.0,)))
     assert "odds" not in next_said(NextExperiment("n.csv", "fixed", (("a", "b"),)))
 
@@ -203,16 +203,16 @@ def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
 def test_a_tie_is_seen_wherever_the_finding_is(model: RobotModel, take: TakeReport) -> None:
     tied = replace(finding(confidence=0.86), alternatives=(Alternative("joint_compliance", ("flm",), 0.12),))
     page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
-    assert "<h1>Backlash at flm (or joint compliance at flm) explains all" in page
-    assert "86 % sure; or joint compliance at flm: 12 %" in page
+    assert "<h1>Backlash at flm (or joint compliance at flm) explains the model" in page
+    assert "probability 86 %; or joint compliance at flm: 12 %" in page
     assert "<b>Or joint compliance at flm: 12 %.</b>" in page
 
 
 def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeReport) -> None:
     tied = replace(finding(confidence=0.5), alternatives=(Alternative("joint_compliance", ("flm",), 0.46),))
     page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
-    assert "96 % sure that it is this or joint compliance at flm" in page
-    assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
+    assert "probability 96 % that it is this or joint compliance at flm" in page
+    assert "50 %, or joint compliance at flm 46 %; together 96 %" in page
     line = finding_line(tied)
     assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings cannot separate" in line
 
@@ -221,23 +221,23 @@ def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeRep
     told = finding()
     page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [take], "S").html()
     assert page.count(sentence_of(told)) == 2  # in the summary and in the section
-    assert "structure errors (how links sit on their joints: 8 of 8)" in page
+    assert "structure errors (how links and joints are built: 8 of 8)" in page
     assert '<a href="next_experiment.csv">next_experiment.csv</a>' in page
     assert "whole robot" not in page
 
 
 def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
     full = diagnosis(model)
-    assert headline(full) == "Backlash at flm explains all that the model missed."
+    assert headline(full) == "Backlash at flm explains the model's entire error."
     two = replace(full, verdict="partly_explained", findings=(finding(), replace(finding("ground_friction"), where=())))
     assert headline(two).startswith("Backlash at flm and ground friction explain part of")
     guess = replace(finding("ground_friction"), where=(), confidence=0.4, alternatives=())
     assert headline(replace(two, findings=(finding(), guess))) == (
-        "Backlash at flm explains part of the model's error; the rest is not identified with certainty yet.")
+        "Backlash at flm explains part of the model's error; the rest is not yet identified with certainty.")
     assert headline(replace(two, findings=(guess,))) == (
         "No known effect is a likely explanation of the model's error; the closest candidate is ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
-    assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
+    assert headline(replace(nothing, verdict="no_gap")).startswith("The nominal model explains these recordings")
     assert "no known effect explains the difference" in headline(replace(nothing, verdict="unexplained"))
 
 
@@ -245,7 +245,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     paths = write_diagnosis(diagnosis(model), [take], tmp_path / "out", "Session small")
     assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
     page = (tmp_path / "out/report.html").read_text()
-    order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
+    order = ["Backlash at flm explains the model", "flm has 2.0 deg of free play", "trot was left out: line 9",
              "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
              "Alternatives that were tried", "dead band at flm reduces chi squared", "Before and after, on unseen stretches",
@@ -260,7 +260,7 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeRep
     quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
     assert "The recordings do not differ from the nominal model by more than chance." in page
-    assert "everything is within" in page
+    assert "every channel is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
 
@@ -276,7 +276,7 @@ def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, take: TakeRe
 def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     told = replace(diagnosis(model).findings[0], where=("flm", "flb"))
     assert title_of(told.effect, told.where).endswith("at flm or flb")
-    assert sentence_of(told).endswith("Or the same at flb: these recordings cannot tell.")
+    assert sentence_of(told).endswith("Or the same at flb: these recordings do not distinguish them.")
     assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
 
 

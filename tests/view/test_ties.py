@@ -24,26 +24,27 @@ def test_a_tie_of_gravity_and_torque_leads_and_its_names_have_their_own_share(tm
     spring = replace(finding("parallel_spring", 0.49), alternatives=(Alternative("payload", ("FLmid",), 0.49),), of_tie=0.98,
                      parameters={"stiffness": Estimate(0.3, 0.2, 0.4, "N m/rad")})
     found = replace(diagnosis(model), findings=(spring,), tied=(tie,))
-    assert headline(found) == ("A change of gravity over torque at flm (parallel spring at flm or payload at FLmid) explains all "
-                               "that the model missed.")
+    assert headline(found) == ("A change in the ratio of gravity to torque at flm (parallel spring at flm or payload at FLmid) "
+                               "explains the model's entire error.")
     page = diagnosis_report(found, [], "Session small").html()
-    assert "Gravity over torque in flm is 1.30 (1.22 to 1.41) times that of the earlier model. Angles alone do not tell" in page
-    assert page.index("What angles do not tell apart") < page.index("<h2>Parallel spring at flm")
-    assert "49 %, or payload at FLmid 49 %; one of several names of gravity over torque, 98 % together" in page
-    assert "98 % sure that it is this" not in page
-    assert "(confidence 0.49, as one of several names of gravity over torque, 0.98 together" in finding_line(spring)
+    assert "The ratio of gravity to torque in flm is 1.30 (1.22 to 1.41) times that of the earlier model. Angles alone" in page
+    assert page.index("Causes that angles cannot distinguish") < page.index("<h2>Parallel spring at flm")
+    assert "49 %, or payload at FLmid 49 %; one of several explanations of the ratio of gravity to torque, together 98 %" in page
+    assert "98 % that it is this" not in page
+    line = finding_line(spring)
+    assert "(confidence 0.49, as one of several explanations of the ratio of gravity to torque, together 0.98" in line
 
 
 def test_where_a_known_weight_leaves_one_cause_it_is_said() -> None:
     names = (TiedName("payload", ("FLmid",), {}, "It is a payload.", 26.0),)
     tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0, weighed=True)
     assert tied_in_short(tie).endswith("times that of the files. Cause: other torques of the servo.")
-    assert "recordings leave one: all torques" in tie.in_words()
+    assert "leave only one possible cause: all torques" in tie.in_words()
 
 
 def test_without_a_known_weight_a_load_may_account_for_a_part() -> None:
     names = (TiedName("payload", ("FLmid",), {}, "It is a payload.", 26.0),)
     tie = GravityOverTorque(("flm",), Estimate(0.4, 0.38, 0.42, "1"), 0.0, names, False, 7.0)
-    assert "alone or together with a change of what it carries" in tied_in_short(tie)
-    assert "may account for a part of it" in tie.in_words()
+    assert "alone or together with a change of its load" in tied_in_short(tie)
+    assert "may account for part of it" in tie.in_words()
     assert "hang a known weight" in tie.in_words()

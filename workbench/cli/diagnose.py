@@ -105,7 +105,7 @@ def finding_line(finding: Finding) -> str:
     tie, error = finding.tie, finding.validation
     other = f" {this_or(tie)}, which these recordings cannot separate" if tie else ""
     if finding.of_tie is not None:
-        other = f", as one of several names of gravity over torque, {finding.of_tie:.2f} together"
+        other = f", as one of several explanations of the ratio of gravity to torque, together {finding.of_tie:.2f}"
     family = "" if finding.family is None else f", {finding.family.name} {finding.family.confidence:.2f}"
     return f"{finding.evidence} (confidence {finding.together:.2f}{other}{family}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"

@@ -51,8 +51,8 @@ class AsTorque:
         """For a person: what else it could be, and what would tell."""
         more = "less" if self.by < 0 else "more"
         percent = 100 * abs(math.expm1(self.by))
-        return (f" Or the servo's torques are {percent:.0f} % {more}: angles tell gravity over torque alone. "
-                "A known weight hung on the link tells them apart.")
+        return (f" Or the servo's torques are {percent:.0f} % {more}: angles determine only the ratio of gravity to "
+                "torque. A known weight hung on the link separates the two.")
 
 
 def competes(c: Candidate) -> bool:

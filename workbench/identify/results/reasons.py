@@ -54,8 +54,8 @@ class WorseInPlace(Reason):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        more = f"{self.behind:.0f} more" if self.behind >= 0 else f"only {-self.behind:.0f} less"
-        return f"in place of {naming(self.effect, self.where)} it leaves {more} of chi squared on stretches that no fit saw"
+        more = f"{self.behind:.0f} higher" if self.behind >= 0 else f"only {-self.behind:.0f} lower"
+        return f"in place of {naming(self.effect, self.where)} it leaves chi squared {more} on held-out stretches"
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ScreenedOut(Reason):
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         takes = f"reduces chi squared by {self.gain:.0f} at most" if self.gain >= 1 else "does not reduce chi squared"
-        return f"its response does not match the residuals: it {takes}, the best rival's reduces it by {self.best:.0f}"
+        return f"its response does not match the residuals: it {takes}, the best competing effect by {self.best:.0f}"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class TooLittle(Reason):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return "it reduces the error no more than chance would, or by too little of the excess there"
+        return "it reduces the error no more than chance would, or removes too little of the excess error there"
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ class Outdone(Reason):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return (f"{naming(self.effect, self.where)} reduces chi squared on the choosing stretches by {self.taken:.0f}, this one "
-                f"by {self.gain:.0f}")
+        return (f"{naming(self.effect, self.where)} reduces chi squared by {self.taken:.0f} on the stretches that decide between "
+                f"effects, this one by {self.gain:.0f}")
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class SpokenAgainst(Reason):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the held-out takes are {_times(self.by)} less probable with it"
+        return f"with it, the held-out takes are {_times(self.by)} less probable"
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,8 @@ class RefutedByRegister(Reason):
 
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the servos' own registers give {self.parameter} {self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
+        value = f"{self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
+        return f"the servos' own registers show that {self.parameter} is {value}"
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ class AtItsEnd(Reason):
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         value = f"{self.value:.3g}{_behind_number(self.unit)}"
-        return f"its {self.parameter} would have to be {value} or beyond, which is not plausible on this robot"
+        return f"its {self.parameter} would have to be {value} or beyond, which is not plausible for this robot"
 
 
 def _times(nats: float) -> str:
@@ -197,7 +198,7 @@ class ParameterDrift(Description):
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return (f"{self.parameter} of {naming(self.effect, self.where)} would have to change from {self.first:.3g} to "
-                f"{self.last:.3g} {self.unit} within a take: something that varies with time may be the cause")
+                f"{self.last:.3g} {self.unit} within a take: the cause may be something that varies with time")
 
 
 @dataclass(frozen=True)
@@ -210,4 +211,4 @@ class DownwardPull(Description):
     def in_words(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
         return (f"the {self.effect.replace('_', ' ')} is a vertical pull of {1e3 * self.mass:.0f} g, but without the inertia of "
-                "a load: something that hangs and swings may be the cause")
+                "a load: the cause may be something that hangs and swings")

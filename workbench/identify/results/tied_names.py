@@ -56,8 +56,8 @@ class GravityOverTorque:
         joints, before = ", ".join(self.where), "earlier model" if self.since else "files"
         told = f"{self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times that of the {before}"
         if low <= 1.0 <= high:  # type: ignore[operator]
-            return f"Gravity acts otherwise on {joints} than in the {before}, while gravity over torque is {told}."
-        return f"Gravity over torque in {joints} is {told}."
+            return f"Gravity acts differently on {joints} than in the {before}, while the ratio of gravity to torque is {told}."
+        return f"The ratio of gravity to torque in {joints} is {told}."
 
     @property
     def may_be_torque(self) -> bool:
@@ -72,17 +72,17 @@ class GravityOverTorque:
 
     def in_words(self) -> str:
         """For a person: the ratio, everything that it may come from, and how to find out."""
-        torque = f"all torques of the servo times {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
+        torque = f"all torques of the servo multiplied by {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
         causes = [(torque, self.torque_behind)] if self.may_be_torque else []
         causes += [(n.sentence.rstrip("."), n.behind) for n in self.competitive]
         each = [f"{said} ({behind:.0f} nats behind)" if behind >= 1 else said for said, behind in causes]
         if len(each) == 1 and not self.may_be_several:
-            return f"{self.change} Of its possible causes the recordings leave one: {each[0]}."
+            return f"{self.change} The recordings leave only one possible cause: {each[0]}."
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
-        causes_said = f"Angles alone cannot separate its possible causes: {'; '.join(each)}."
+        causes_said = f"Angles alone do not distinguish between the possible causes: {'; '.join(each)}."
         if len(each) == 1:
-            causes_said = (f"Of causes that explain it alone the recordings leave one: {each[0]}; a load, a centre of mass or a "
-                           "spring may account for a part of it, as angles tell nothing but the ratio.")
+            causes_said = (f"The recordings leave only one cause that explains it alone: {each[0]}; a load, a displaced centre "
+                           "of mass or a spring may account for part of it, since angles determine only the ratio.")
         return f"{self.change} {causes_said} To find out, hang a known weight on the link in some takes (`load:`){more}."
 
     def to_json(self) -> dict[str, Any]:

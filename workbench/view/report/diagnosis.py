@@ -84,7 +84,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     report.add(_residuals_section(diagnosis))
     others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", rejected_table(others, "more that were tried")))
+        report.add(Section("What else was tried", rejected_table(others, "more rejected effects")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
@@ -98,7 +98,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if takes:
         what.append(f"Evaluated on stretches of {join_words([s.name for s in takes])} ({seconds:.0f} s in all) that "
                     "were held out from the choice of effects and from every fit. **1×** is the error that measurement noise, "
-                    "numerics and the choice of contact model cause alone.")
+                    "numerical error and the choice of contact model alone would cause.")
     if any(c in BODY for s in takes for c in s.channels):
         what.append(
             "Walking is chaotic: for evaluation, a simulated walk is reset to the recorded base every "
@@ -113,27 +113,28 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what += said_aside(diagnosis.provenance)
     what += hidden_effects(diagnosis.provenance.get("cannot_show", {}))
     if why := diagnosis.provenance.get("engine", {}).get("because"):
-        what.append(f"All rollouts were computed by Drake, because {why}.")
+        what.append(f"Drake computed all rollouts, because {why}.")
     if diagnosis.stopped:
-        what.append("The search stopped at its work limit, so some residuals were not examined.")
+        what.append("The search reached its work limit before it had examined all residuals.")
     return " ".join(what)
 
 
 def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
-    numbers = [(f"gravity over torque at {join_words(t.where)}", f"{t.ratio.value:.2f}×",
+    numbers = [(f"gravity / torque at {join_words(t.where)}", f"{t.ratio.value:.2f}×",
                 f"{interval(t.ratio)}; possible causes: {len(t.competitive) + t.may_be_torque}"
                 + (", alone or together" if t.may_be_several else "")) for t in diagnosis.tied]
     for f in (f for f in diagnosis.findings if f.of_tie is None):
         rival = rival_of(f)
-        sure = f"{probable(f.together)} sure" + (
+        sure = f"probability {probable(f.together)}" + (
             f" {this_or(f.tie)}" if f.tie else
             f"; or {title_of(rival.effect, rival.where)}: {probable(rival.confidence)}" if rival else "")
         told = max(f.parameters.values(), key=_is_bounded, default=None)
-        numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
+        numbers.append((title_of(f.effect, f.where), "present" if told is None else _size(told), sure))
     for s in takes:
         before, after = s.ratios(s.before), s.ratios(s.after)
         worst = max(before, key=lambda c: finite(before[c]))
-        numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
+        numbers.append((f"{s.name}: worst channel, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×",
+                        "on unseen stretches"))
     return numbers[:8]
 
 
@@ -165,22 +166,22 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
         parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
-                             "Error of each joint with the nominal model; an error in one joint also moves others."))
+                             "Error of each joint with the nominal model. An error in one joint also affects others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += folded_table(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
-        parts.append(Details("The same map of the other takes", maps[1:]))
+        parts.append(Details("Error maps of the other takes", maps[1:]))
     return Section("Where the recordings differ from the model", parts)
 
 
 def _map_caption(take: TakeReport) -> str:
-    said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
-            "Green on top: held-out stretches. Grey: not recorded")
+    said = (f"{take.name}: each row is a joint or a motion of the body; the darker, the larger the error of the model. "
+            "Green bar at the top: held-out stretches. Grey: not recorded")
     if any(c in BODY for c in take.channels):
-        said += f", or the model's base had just been reset to the recorded one, as every {PROBLEM.window:g} s"
+        said += f", or right after the model's base was reset to the recorded one (every {PROBLEM.window:g} s)"
     return said + "."
 
 
@@ -197,8 +198,9 @@ def _unseen(takes: Sequence[TakeReport]) -> Section:
     over = {s.name: [c for c, r in s.ratios(s.after).items() if r > LIMIT] for s in takes}
     said = "; ".join(f"in {name} {join_words(places)}" for name, places in over.items() if places)
     parts: list[Part] = [Picture(
-        unseen_errors(takes), f"With the findings, still above {LIMIT:g} times noise and numerics: {said}." if said else
-        f"With the findings, everything is within {LIMIT:g} times noise and numerics.")]
+        unseen_errors(takes),
+        f"With the findings applied, still above {LIMIT:g} times noise and numerical error: {said}." if said else
+        f"With the findings applied, every channel is within {LIMIT:g} times noise and numerical error.")]
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
                       f"{s.name}: the body's path as measured, and simulated with and without (nominal) the findings.")
               for s in takes if _walks(s)]
@@ -214,13 +216,13 @@ def _walks(take: TakeReport) -> bool:
 def _residuals_section(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
         nothing = diagnosis.verdict in ("no_gap", "explained")
-        return Section("Residuals", [Text("No residual above noise and numerical error." if nothing else
+        return Section("Residuals", [Text("No residual exceeds noise and numerical error." if nothing else
                                              "Errors that still exceed the green band above are unexplained.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
-    header = ["remaining error", "take", "size", "over noise", "correlation"]
+    header = ["remaining error", "take", "size", "ratio to noise", "correlation"]
     off = [left_row(u) for u in order if is_error(u)]
-    still = [Text("On unseen stretches the fitted model still exceeds noise and numerical error (1×). No "
-                  "effect that was tried explains it."), *folded_table(header, off, "more")] if off else []
+    still = [Text("On unseen stretches the fitted model still has errors above noise and numerical error (1×), "
+                  "which none of the effects that were tried explains."), *folded_table(header, off, "more")] if off else []
     return Section("Residuals", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 

@@ -27,24 +27,24 @@ def finding_section(finding: Finding, rejected: Sequence[Rejected], takes: Seque
                           "that out."))
         sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
     if finding.tie:
-        sure += f": {probable(finding.together)} for one of the two"
+        sure += f"; together {probable(finding.together)}"
     if finding.of_tie is not None:
-        sure += f"; one of several names of gravity over torque, {probable(finding.of_tie)} together"
+        sure += f"; one of several explanations of the ratio of gravity to torque, together {probable(finding.of_tie)}"
     f = finding.family
-    family = [] if f is None else [["probability of the family", f"{f.name}: {probable(f.confidence)}"]]
+    family = [] if f is None else [["probability of the effect family", f"{f.name}: {probable(f.confidence)}"]]
     rows = [["probability", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
-    rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
+    rows += [["error on fitted stretches", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
     shown = _best_view(finding, takes, drawn, others)
     if shown is not None:
         i, joint = shown
         drawn.add(shown)
         parts.append(Picture(before_after(takes[i], joint),
-                             f"{joint} in {takes[i].name}: recorded, and predicted by each model."))
+                             f"{joint} in {takes[i].name}: recording, and prediction of each model."))
     instead = [r for r in rejected if rivals(r, finding)]
     if instead:
         parts.append(Text("Alternatives that were tried and rejected:"))
-        parts += rejected_table(instead, "more rivals")
+        parts += rejected_table(instead, "more alternatives")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 

@@ -39,9 +39,9 @@ def _errors(take: TakeReport) -> list[Errors]:
 
 
 def _replay_caption(take: TakeReport, errors: Sequence[Errors]) -> str:
-    said = (f"{take.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
-            f"above, as it runs: small and pale where a joint is within {LIMIT:g} times noise and numerics of the nominal model, "
-            f"large and dark at {DARKEST:g} times, grey where it was not seen.")
+    said = (f"{take.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints show the "
+            f"error map above over time: small and pale while a joint is within {LIMIT:g} times noise and numerical error of "
+            f"the nominal model, large and dark at {DARKEST:g} times, grey while it was not seen.")
     if any(c in BODY for c in take.channels):
-        said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
-    return said + (" Tick the fitted model's to see the residuals." if len(errors) > 1 else "")
+        said += " The sphere at the body shows the error of its tilt and height, the disc under it that of its path and heading."
+    return said + (" Tick the error against the fitted model to see the residuals." if len(errors) > 1 else "")

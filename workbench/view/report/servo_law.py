@@ -17,11 +17,11 @@ from workbench.view.report.words import capital, change, join_words, probable, t
 def unknown_torque_section(unknown: UnknownTorque) -> Section:
     """Its probability, size and errors, with its plot."""
     rows = [["probability", probable(unknown.confidence)], ["RMS over the recorded motion", f"{1e3 * unknown.rms:.2g} mN m"],
-            ["error where it was fitted", change(unknown.fit)], ["error on unseen stretches", change(unknown.validation)]]
+            ["error on fitted stretches", change(unknown.fit)], ["error on unseen stretches", change(unknown.validation)]]
     parts: list[Part] = [
         Text(capital(unknown.evidence)),
-        Text("It is repeatable: the same function fits all takes. model.yaml holds it as a table, so simulations and gaits "
-             "include it. A known cause would have to produce this curve."),
+        Text("The torque is repeatable: the same function fits all takes. model.yaml contains it as a table, so simulations "
+             "and gaits include it. Whatever causes it has to produce this curve."),
         Table(["", "value"], rows),
         Picture(unknown_torque(unknown), f"The torque at {unknown.joint} that the recordings require, with 90 % bounds.")]
     return Section(f"Unknown torque at {unknown.joint}", parts)
@@ -33,18 +33,18 @@ def tied_in_short(tie: GravityOverTorque) -> str:
     if tie.may_be_torque:
         causes.append("other torques of the servo")
     if len(causes) == 1:
-        more = ", alone or together with a change of what it carries, which angles do not tell" if tie.may_be_several else ""
+        more = ", alone or together with a change of its load, which angles cannot distinguish" if tie.may_be_several else ""
         return f"{tie.change} Cause: {causes[0]}{more}."
-    return f"{tie.change} Angles alone do not tell the cause: {join_words(causes, 'or')}."
+    return f"{tie.change} Angles alone do not determine the cause: {join_words(causes, 'or')}."
 
 
 def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
     """Gravity over torque, and each effect that would explain it alone."""
     rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
     several = any(len(t.competitive) + t.may_be_torque > 1 or t.may_be_several for t in ties)
-    title = "What angles do not tell apart" if several else "Gravity over torque"
+    title = "Causes that angles cannot distinguish" if several else "Ratio of gravity to torque"
     return Section(title, [*(Text(t.in_words()) for t in ties), *folded_table(
-        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
+        ["effect", "size, if it is the only cause", "less likely by [nats]"], rows, "more effects")])
 
 
 def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
@@ -52,6 +52,6 @@ def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
     rows = [[r.number.replace("_", " "), join_words(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}",
              unbroken(unit), f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
-    said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
+    said = "These constants were adjusted within the tolerances of your servo file; this does not count as a finding."
     return Section("Recalibrated constants", [Text(said), *folded_table(
-        ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
+        ["constant", "where", "nominal", "adjusted", "unit", "standard deviations"], rows, "more constants")])

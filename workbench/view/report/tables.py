@@ -17,12 +17,12 @@ SHOWN = 6
 def rejected_table(rejected: Sequence[Rejected], summary: str) -> list[Part]:
     """A table; without a column of errors where none was measured."""
     measured = any(r.validation is not None for r in rejected)
-    header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
+    header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why rejected"]
     rows = [[unbroken(name_of(r.effect)), place_of(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
             for r in sorted(rejected, key=_unlikely)]
     parts = folded_table(header, rows, summary)
     if any(r.reason.of_chi_squared for r in rejected):
-        parts.append(Text("Chi squared is the sum of squared errors over noise: the smaller, the better the fit."))
+        parts.append(Text("Chi squared is the sum of squared errors, each divided by its noise: smaller is a better fit."))
     return parts
 
 

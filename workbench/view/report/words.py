@@ -17,9 +17,9 @@ from workbench.robot import EffectSpec
 NAMED = 0.1
 """A rival this probable is named wherever the finding is."""
 LAYERS: dict[Layer, str] = {
-    "timing": "when commands arrive", "actuator": "how servos act", "structure": "how links sit on their joints",
-    "inertia": "where the mass is", "ground": "how the floor acts", "measurement": "how it was measured"}
-_BODY = {"forward": "how far the body moves", "left": "how far the body drifts to the left", "heading": "the body's heading",
+    "timing": "when commands take effect", "actuator": "how servos behave", "structure": "how links and joints are built",
+    "inertia": "how mass is distributed", "ground": "how the floor acts", "measurement": "how the motion was measured"}
+_BODY = {"forward": "forward motion of the body", "left": "lateral motion of the body", "heading": "the body's heading",
          "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
 _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 
@@ -31,17 +31,17 @@ def headline(diagnosis: Diagnosis) -> str:
     explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
     match diagnosis.verdict:
         case "no_gap":
-            return "The model explains these recordings as they are: nothing is missing that they could show."
+            return "The nominal model explains these recordings: they show no missing physics."
         case "explained":
-            return f"{explain} all that the model missed."
+            return f"{explain} the model's entire error."
         case "partly_explained" if not likely:
             return f"No known effect is a likely explanation of the model's error; the closest candidate is {names}."
         case "partly_explained":
             sure = "" if len(likely) == len(diagnosis.findings) else " with certainty"
-            return f"{explain} part of the model's error; the rest is not identified{sure} yet."
+            return f"{explain} part of the model's error; the rest is not yet identified{sure}."
         case "unexplained" if diagnosis.unknown_torques:
             where = join_words([u.joint for u in diagnosis.unknown_torques])
-            return f"A torque at {where} that no known effect describes explains at least part of the model's error."
+            return f"An unknown torque at {where}, which no known effect describes, explains at least part of the model's error."
         case "unexplained":
             return "The recordings differ from the model, and no known effect explains the difference."
 
@@ -57,7 +57,7 @@ def hidden_effects(why: Mapping[str, str]) -> list[str]:
 def _with_rival(f: Finding, tied: Sequence[GravityOverTorque]) -> str:
     if tie := tie_of(f, tied):
         others = [title_of(n.effect, n.where) for n in tie.competitive]
-        return f"a change of gravity over torque at {join_words(tie.where)} ({join_words(others, 'or')})"
+        return f"a change in the ratio of gravity to torque at {join_words(tie.where)} ({join_words(others, 'or')})"
     rival = rival_of(f)
     return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
 
@@ -105,13 +105,13 @@ def sentence_of(finding: Finding) -> str:
     numbers = {name: e.value for name, e in finding.parameters.items()}
     said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
     others = join_words(finding.where[1:], "or")
-    return said + (f" Or the same at {others}: these recordings cannot tell." if others else "")
+    return said + (f" Or the same at {others}: these recordings do not distinguish them." if others else "")
 
 
 def interval(estimate: Estimate) -> str:
     """The value and its 90 % interval; "at least" or "at most" where one side is open. A vector: its size."""
     if isinstance(estimate.value, tuple):
-        return quantity(math.hypot(*estimate.value), estimate.unit) + " in all"
+        return quantity(math.hypot(*estimate.value), estimate.unit) + " in magnitude"
     return _one(estimate.value, float(estimate.low), float(estimate.high), estimate.unit)  # type: ignore[arg-type]
 
 
@@ -171,7 +171,7 @@ def layers_of(diagnosis: Diagnosis) -> str:
         return ""
     count = {layer: sum(g.layer == layer for g in diagnosis.gap) for layer in LAYERS}
     seen = sorted((layer for layer in LAYERS if count[layer]), key=lambda layer: -count[layer])
-    said = "By location and timing, the errors look like " + join_words(
+    said = "Judged by where and when they occur, the errors look like " + join_words(
         [f"{layer} errors ({LAYERS[layer]}: {count[layer]} of {len(diagnosis.gap)})" for layer in seen]) + "."
     causes: dict[Layer, list[str]] = {}
     for f in diagnosis.findings:
@@ -179,7 +179,7 @@ def layers_of(diagnosis: Diagnosis) -> str:
     if causes:
         found = [f"{join_words(names)} ({LAYERS[layer]}: {layer})" for layer, names in causes.items()]
         several = len(diagnosis.findings) > 1
-        said += f" The cause{'s' if several else ''} found: {join_words(found)}; one cause may show as errors of several kinds."
+        said += f" The cause{'s' if several else ''} found: {join_words(found)}; one cause can produce errors of several kinds."
     if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
         said += " Such a cause affects many joints at once."
     return said
@@ -199,10 +199,10 @@ def left_row(u: Unexplained) -> list[str]:
     joint, _, axis = d.channel.partition(ACROSS)
     what = f"{joint}, across its axis ({axis})" if axis else _BODY.get(d.channel, f"joint {joint}")
     if d.signal is None:
-        return [what, d.take, by, over, "with no tested signal" if u.where else "not with time"]
-    closely = "closely" if d.correlation > 0.7 else "partly" if d.correlation > 0.5 else "loosely"
+        return [what, d.take, by, over, "with none of the tested signals" if u.where else "not with time"]
+    strength = "strongly" if d.correlation > 0.7 else "moderately" if d.correlation > 0.5 else "weakly"
     own = {"time": "", "size of the angle": "the "}.get(d.signal, "its ")
-    return [what, d.take, by, over, f"{closely} with {own}{d.signal} ({d.correlation:.2f})"]
+    return [what, d.take, by, over, f"{strength} with {own}{d.signal} ({d.correlation:.2f})"]
 
 
 def next_said(n: NextExperiment) -> str:
@@ -210,9 +210,10 @@ def next_said(n: NextExperiment) -> str:
     base = ("with the base held on the stand, feet in the air" if n.base == "fixed" else
             "with the robot free on the floor")
     pairs = [f"{name_of(a)} from {name_of(b)}" for a, b in n.separates]
-    odds = [f"{p} (expected odds of the right name: {_odds(x)})" for p, x in zip(pairs, n.log_likelihood_ratios)] or pairs
-    return (f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It separates {join_words(odds)} and stays "
-            "within the servos' limits.")
+    odds = [f"{p} (expected odds in favour of the correct effect: {_odds(x)})"
+            for p, x in zip(pairs, n.log_likelihood_ratios)] or pairs
+    return (f"Play [{n.motion}]({n.motion}) {base}, and record it like the other takes. It separates {join_words(odds)}, and "
+            "it stays within the servos' limits.")
 
 
 def _odds(ratio: float) -> str:
@@ -237,4 +238,4 @@ def unbroken(text: str) -> str:
 def said_aside(provenance: Mapping[str, Any]) -> list[str]:
     """A sentence for each correction of a log, and for each stretch that was excluded from the evidence."""
     aside = provenance.get("set_aside", {})
-    return [f"Set aside in {take}: {line.rstrip('.')}." for take, lines in aside.items() for line in lines]
+    return [f"Corrected or excluded in {take}: {line.rstrip('.')}." for take, lines in aside.items() for line in lines]
