@@ -81,23 +81,23 @@ class Certificate:
         if d.get("count"):
             lowest, five = d[f"speed {n.unit}"][:2]
             low = f"lowest {factor * lowest:.3g}" if five is None else f"5th percentile {factor * five:.3g}"
-            falls = f"{d['falls']} fell (below {100 * d['falls at most']:.2g} % at 95 %)"
-            lines = [f"{self.request}: {low} {unit} of {d['count']} random variants of the robot, {nominal}",
-                     f"{falls}; heading {d['heading deg/m RMS']:.2g} deg/m RMS over them"]
+            falls = f"{d['falls']} fell (probability of a fall below {100 * d['falls at most']:.2g} % at 95 % confidence)"
+            lines = [f"{self.request}: {low} {unit} of {d['count']} sampled robots, {nominal}",
+                     f"{falls}; heading drift {d['heading deg/m RMS']:.2g} deg/m RMS"]
             lines += _straightened(d.get("straightened"))
-            lines += [f"draw {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
+            lines += [f"sample {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
-        lines.append(f"binds: {worst}")
+        lines.append(f"binding limit: {worst}")
         advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)
         if advice is not None and advice.use > 1:
-            lines.append(f"warning: beyond {advice}: it heats")
+            lines.append(f"warning: {advice}; the servo heats up")
         if self.cycle.back:
             lines.append(_returns(self.cycle))
         if self.other_engine:
             e = self.other_engine
-            apart = f"heading {e['heading apart deg/m']:+.1f} deg/m apart"
-            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}; over friction, supply and entry "
-                         f"speeds differ by {100 * e['largest speed apart']:.0f} % at most")
+            apart = f"heading differs by {e['heading apart deg/m']:+.1f} deg/m"
+            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}; over friction, supply and "
+                         f"entry the speeds differ by at most {100 * e['largest speed apart']:.0f} %")
         return "\n".join(lines)
 
 
@@ -112,10 +112,10 @@ def _straightened(found: Mapping[str, Any] | None) -> list[str]:
 
 def _returns(cycle: Steadiness) -> str:
     """Whether the gait is one limit cycle, and how steady, in a line."""
-    scatter = f"heading scatters by {cycle.heading:.2g} deg from cycle to cycle"
+    scatter = f"the heading scatters by {cycle.heading:.2g} deg from cycle to cycle"
     if cycle.lost:
-        return f"does not come back to its cycle: {', '.join(cycle.lost)}; {scatter}"
-    return f"entered otherwise, pushed, or with a pose lost it walks as before after {cycle.slowest} cycles; {scatter}"
+        return f"does not return to its limit cycle: {', '.join(cycle.lost)}; {scatter}"
+    return f"after another entry, a push or a missed pose it returns to its limit cycle within {cycle.slowest} cycles; {scatter}"
 
 
 def read_certificate(path: str | Path) -> Certificate:

@@ -110,7 +110,7 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
         asked = float(table.cycle.rates()[:, i].max())
         out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))
     for i, leg in enumerate(machine.legs):
-        out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))
+        out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm from the path"))
     if not other_family(table.cycle):  # only the CM-530's program, which plays no other family, holds a table in its memory
         poses = len(table.whole)
         out.append(_of("poses", "table", poses, most_poses(len(model.joints)), "poses"))
@@ -150,7 +150,7 @@ def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:
     slowest = cycle.slowest
     if slowest.cycles is None:
         use = max(2.0, cycle.watched / limits.back)
-        said = "cycles, fell" if slowest.fell else "cycles, and not back"
+        said = "cycles, fell" if slowest.fell else "cycles, not returned"
         return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), said, use)
     return _of("way back to its cycle", slowest.entry, slowest.cycles, limits.back, "cycles")
 
