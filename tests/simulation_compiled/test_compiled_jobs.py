@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,9 @@ from workbench.motion.files import load_motion
 from workbench.robot import EffectSpec, Ground, RobotModel, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, Start, simulate_batch
 from workbench.simulation.batch import run_job
-from workbench.simulation.compiled import covers, station
+from workbench.simulation.compiled import covers
 from workbench.simulation.compiled.angles import servo_angles
+from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.rollout import BaseState
 from workbench.simulation.steady import BaseStates
 
@@ -171,10 +173,20 @@ def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robo
         np.testing.assert_array_equal(take.q, alone.q)
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_the_station_is_compiled_ahead_unless_it_was_before(known, monkeypatch):
-    played = []
-    monkeypatch.setattr(station, "is_compiled", lambda *_: known)
-    monkeypatch.setattr(station, "run_compiled", played.append)
-    assert station.compile_station() is not known
-    assert len(played) == (not known)
+def test_the_same_code_compiled_in_another_checkout_does_not_count(tmp_path, monkeypatch):
+    """numba would compile again, in each of several processes at once."""
+    monkeypatch.setattr("workbench.simulation.compiled.kernel.cache_folder", lambda: tmp_path / "kept")
+    source = "from workbench.simulation.compiled.kernel import kernel\n\n\n@kernel\ndef double(x):\n    return 2.0 * x\n"
+    doubles = []
+    for checkout in ("one", "other"):
+        path = tmp_path / checkout / "double.py"
+        path.parent.mkdir()
+        path.write_text(source)
+        spec = importlib.util.spec_from_file_location(f"double_{checkout}", path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        doubles.append(module.double)
+    first, second = doubles
+    assert first(1.0) == 2.0
+    assert is_compiled(first)
+    assert not is_compiled(second)

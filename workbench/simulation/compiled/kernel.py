@@ -35,14 +35,14 @@ def cache_folder() -> Path:
     return Path(os.environ.get("NUMBA_CACHE_DIR") or user) / f"compiled-{digest.hexdigest()[:16]}"
 
 
-RUN, LANES = "run.run", "play.play_lanes"
-"""Kernels by file and name: of one robot, and of several held ones."""
-_found: set[str] = set()
+_found: set[object] = set()
 
 
-def is_compiled(kernel: str = RUN) -> bool:
-    """Whether this version's code was compiled on this machine before: else the first run takes a minute longer."""
-    if kernel not in _found and any(cache_folder().rglob(f"{kernel}*.nbc")):
+def is_compiled(kernel: Any) -> bool:
+    """Whether a kernel of this checkout was compiled on this machine before: else its first run takes a minute longer. numba
+    keeps code by the path of its source, so that another checkout of the same code does not count."""
+    folder = kernel.stats.cache_path
+    if kernel not in _found and folder is not None and any(Path(folder).glob(f"*.{kernel.__name__}-*.nbc")):
         _found.add(kernel)
     return kernel in _found
 

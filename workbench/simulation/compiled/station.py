@@ -18,7 +18,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
 from workbench.simulation.compiled.arrays import Log, Schedule, State, Work, work_for
-from workbench.simulation.compiled.kernel import RUN, is_compiled
+from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.compiled.machine import Machine, machine_of
 from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
@@ -33,7 +33,7 @@ T = TypeVar("T")
 ENDED = {TOUCHED: "shapes touch that are neither a foot on the floor nor a sphere on another link"}
 """Why a run was given up, by how it ended; any other way, Drake shall say."""
 _first = Lock()
-_ran: set[str] = set()
+_ran: set[object] = set()
 
 
 def covers(job: Job) -> str | None:
@@ -50,7 +50,7 @@ def run_compiled(job: Job) -> Take:
     return announced(CompiledJob(job).take)
 
 
-def announced(play: Callable[[], T], kernel: str = RUN) -> T:
+def announced(play: Callable[[], T], kernel: object = run) -> T:
     """What `play` returns; before the first run of this kernel on a machine, says that the station is being compiled."""
     if is_compiled(kernel) or kernel in _ran:
         return play()
@@ -63,12 +63,9 @@ def announced(play: Callable[[], T], kernel: str = RUN) -> T:
             _ran.add(kernel)
 
 
-def compile_station() -> bool:
-    """Compiles the kernel of one robot unless this machine has it compiled; whether there was anything to do."""
-    if is_compiled():
-        return False
+def compile_station() -> None:
+    """Compiles the kernel of one robot, unless this machine keeps it for this checkout: plays a millisecond."""
     run_compiled(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0))
-    return True
 
 
 def _check(job: Job) -> None:

@@ -9,8 +9,6 @@ import numpy as np
 
 from workbench.robot import puppy_model
 from workbench.simulation.compiled.arrays import Schedule, Shapes, State, Tree
-from workbench.simulation.compiled.kernel import LANES as LANES_KERNEL
-from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.compiled.lanes.arrays import (
     LaneServos,
     Lost,
@@ -107,17 +105,14 @@ def _played(chunk: Sequence[CompiledJob], schedule: Schedule, robots: _Robots) -
 def _run(chunk: Sequence[CompiledJob], schedule: Schedule, states: State, rows: int, robots: _Robots) -> tuple[Array, Lost]:
     """Angles (LANES, rows, n) from states on, and in which lanes they are good."""
     q, lost = np.empty((LANES, rows, len(robots.trees.parent))), np.zeros(LANES, dtype=bool)
-    announced(lambda: play_lanes(*robots[:3], schedule, states, q, lost, robots.room), LANES_KERNEL)
+    announced(lambda: play_lanes(*robots[:3], schedule, states, q, lost, robots.room), play_lanes)
     return q, ~lost[:len(chunk)]
 
 
-def compile_lanes() -> bool:
-    """Compiles the kernel of several robots unless this machine has it compiled; whether there was anything to do."""
-    if is_compiled(LANES_KERNEL):
-        return False
+def compile_lanes() -> None:
+    """Compiles the kernel of several robots, unless this machine keeps it for this checkout: plays a millisecond."""
     job = CompiledJob(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0, times=np.zeros(1)))
     joint_angles([(job, job.schedule())])
-    return True
 
 
 def _upright(job: CompiledJob) -> State:
