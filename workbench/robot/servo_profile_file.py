@@ -172,7 +172,7 @@ def _registers(f: Fields) -> Mapping[str, Register]:
         out[name] = Register(name, int(value[0]), int(value[1]), sign)
     missing = [name for name in _NEEDED if name not in out]
     if missing:
-        raise f.error(missing[0], "is missing")
+        raise f.error(", ".join(missing), "is missing" if len(missing) == 1 else "are missing")
     return out
 
 
