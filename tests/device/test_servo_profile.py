@@ -84,6 +84,7 @@ def test_the_slope_has_seven_effective_values():
     ("supply: [9, 12.6]", "supply: [12, 9]", r"supply: expected \[lowest, highest\]"),
     ("punch: {value: 32, sd: 0}", "punch: {value: 32}", "nominal.punch.sd: is missing"),
     ("  punch: {value: 32, sd: 0}\n", "", "nominal: expected compliance_slope"),
+    ("  stall_torque: {value: 1.5, sd: 0} ", "  #", "nominal.stall_torque: is missing"),
     ("full_torque: 1023", "full_torque: 1023\ncolour: red", "colour: unknown key"),
 ])
 def test_a_profile_that_is_wrong_is_named_with_its_place(tmp_path, old, new, said):
