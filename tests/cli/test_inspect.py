@@ -44,6 +44,15 @@ def test_session_and_what_it_names(tmp_path: Path, capsys: pytest.CaptureFixture
     assert _inspected(capsys, tmp_path / "robot.sdf")["details"]["base"] == "fixed to the world"
 
 
+def test_servo_constants_that_name_only_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "servo.yaml"
+    path.write_text("model: XL-330\n")
+    said = _inspected(capsys, path)
+    assert (said["kind"], said["details"]["model"]) == ("servo_constants", "XL-330")
+    path.write_text("model: XL-999\n")
+    assert "servo.yaml: model: no servo profile for 'XL-999'" in refused(capsys, "inspect", str(path))
+
+
 def test_model_yaml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     effect = "{effect: backlash, where: [flm], parameters: {gap: 3.1}}"
     (tmp_path / "model.yaml").write_text(f"format: 1\nrobot: {{}}\neffects: [{effect}]\n")

@@ -78,11 +78,13 @@ def test_the_slope_has_seven_effective_values():
     ("protocol: 1", "protocol: 3", "protocol: expected 1 or 2"),
     ("goal_position: [30, 2]", "goal_position: [30, 3]", r"registers.goal_position: expected \[address, size\]"),
     ("  goal_position: [30, 2]\n", "", "registers.goal_position: is missing"),
+    ("  goal_position: [30, 2]\n  moving_speed: [32, 2]\n", "", "registers.goal_position, moving_speed: are missing"),
     ("present_load: [40, 2, 10]", "present_load: [40, 2, 17]", "registers.present_load: expected `two` or a bit"),
     ("registers: [punch]", "registers: [bite]", "law.punch.registers: expected names of registers"),
     ("supply: [9, 12.6]", "supply: [12, 9]", r"supply: expected \[lowest, highest\]"),
     ("punch: {value: 32, sd: 0}", "punch: {value: 32}", "nominal.punch.sd: is missing"),
     ("  punch: {value: 32, sd: 0}\n", "", "nominal: expected compliance_slope"),
+    ("  stall_torque: {value: 1.5, sd: 0} ", "  #", "nominal.stall_torque: is missing"),
     ("full_torque: 1023", "full_torque: 1023\ncolour: red", "colour: unknown key"),
 ])
 def test_a_profile_that_is_wrong_is_named_with_its_place(tmp_path, old, new, said):

@@ -15,6 +15,7 @@ from workbench.effects.base import Effect
 from workbench.effects.foreign import check_effect
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
 from workbench.files import InputError
+from workbench.identify.rollouts.key import rollout_code
 from workbench.robot import EffectSpec, puppy_model
 
 SOUND = """
@@ -95,3 +96,11 @@ def test_the_workbenchs_own_effects_pass() -> None:
     with pytest.raises(InputError, match="not known, or its package is not installed"):
         physics_of(puppy_model().with_effect(EffectSpec("no_such")))
     assert isinstance(known_effects()["backlash"], Effect)
+
+
+def test_rollouts_are_remembered_by_the_effects_code_too(install: Install, tmp_path: Path) -> None:
+    without = rollout_code.__wrapped__()
+    install(SOUND)
+    installed = rollout_code.__wrapped__()
+    (tmp_path / "cap_bad.py").write_text(SOUND.replace("slow", "slower"))
+    assert len({without, installed, rollout_code.__wrapped__()}) == 3

@@ -16,7 +16,8 @@ from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
 from workbench.recording.servo_log.goal_stamps import STAMPS
-from workbench.robot import ROBOTS, RobotModel, load_servo_constants
+from workbench.robot import ROBOTS, RobotModel, ServoConstants, load_servo_constants
+from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import unknown_family
 
 if TYPE_CHECKING:
@@ -263,13 +264,21 @@ def _yaml(path: Path) -> Inspection:
         return _session(path)
     if not {"effects", "servos", "robot"}.isdisjoint(content):
         return _fitted_model(path)
-    if "stall_torque" in content:
-        servo = load_servo_constants(path)
+    if "stall_torque" in content or "model" in content:
+        servo = _nominal(path, content["model"]) if set(content) == {"model"} else load_servo_constants(path)
         law = "proportional_gain" if servo.proportional_gain is not None else "compliance"
         details, unknown = {"model": servo.model, "law": law}, unknown_family(servo.model)
         return Inspection(str(path), "servo_constants", units="N m, rad/s, V", details=details,
                           problems=(*servo.doubts, *([f"{unknown}; simulated, but not sent to a robot"] if unknown else [])))
-    raise InputError(path, "expected a session (takes), a model (effects, servos) or servo constants (stall_torque)")
+    raise InputError(path, "expected a session (takes), a model (effects, servos) or servo constants (stall_torque; model)")
+
+
+def _nominal(path: Path, model: object) -> ServoConstants:
+    """Of a servo of which the file names only the model."""
+    try:
+        return servo_profile(str(model)).constants()
+    except InputError as e:
+        raise InputError(path, f"model: {e.problem}") from None
 
 
 def _session(path: Path) -> Inspection:

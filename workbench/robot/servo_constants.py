@@ -237,7 +237,7 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
     for key in content:
         if key not in KEYS:
             raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(KEYS))}")
-    missing = sorted(_REQUIRED - set(content))
+    missing = sorted(REQUIRED - set(content))
     if missing:
         raise InputError(path, f"{at}key '{missing[0]}' is missing")
     empty = [key for key in content if content[key] is None]
@@ -266,5 +266,5 @@ def _value_and_sd(content: Mapping[Any, Any], path: Path, at: str) -> tuple[Any,
     return content["value"], float(sd)
 
 
-_REQUIRED = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
-             "reflected_inertia"}
+REQUIRED = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
+            "reflected_inertia"}

@@ -14,7 +14,7 @@ from workbench.files import InputError
 from workbench.files.plug_ins import with_plug_ins
 from workbench.files.resources import resource_dir
 from workbench.files.yaml_file import Fields, top_of
-from workbench.robot.servo_constants import TOLERANCES, ServoConstants
+from workbench.robot.servo_constants import REQUIRED, TOLERANCES, ServoConstants
 from workbench.robot.servo_profile import LAW_KEYS, MORE_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
 
 ENTRY_POINT_GROUP = "workbench.servos"
@@ -172,7 +172,7 @@ def _registers(f: Fields) -> Mapping[str, Register]:
         out[name] = Register(name, int(value[0]), int(value[1]), sign)
     missing = [name for name in _NEEDED if name not in out]
     if missing:
-        raise f.error(missing[0], "is missing")
+        raise f.error(", ".join(missing), "is missing" if len(missing) == 1 else "are missing")
     return out
 
 
@@ -211,6 +211,9 @@ def _nominal(f: Fields) -> Mapping[str, Uncertain]:
             out[key] = Uncertain(_number(entry, "value"), _number(entry, "sd"))
             entry.done()
     f.done()
+    missing = sorted(REQUIRED - set(out))
+    if missing:
+        raise f.error(", ".join(missing), "is missing" if len(missing) == 1 else "are missing")
     return out
 
 

@@ -1,12 +1,14 @@
 """Everything that a rollout's channels depend on, as a name under which they are remembered.
 
 The robot, its effects, the take (commands, frames, start, windows, how it is looked at), the configuration, engine and step, and
-the code that rollouts run through; not the code of the search, so that a change of that finds every rollout again.
+the code that rollouts run through, effects of other packages included; not the code of the search, so that a change of that finds
+every rollout again.
 """
 
 from __future__ import annotations
 
 import hashlib
+import sys
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +17,7 @@ from typing import TYPE_CHECKING
 import joblib
 import numpy as np
 
+from workbench.effects.registry import known_effects
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
@@ -33,7 +36,21 @@ def rollout_code() -> str:
     digest = hashlib.sha256(" ".join(version(name) for name in ("drake", "numba", "numpy", "scipy")).encode())
     for path in sorted([*(p for room in _ROOMS for p in (root / room).rglob("*.py")), *(root / name for name in _FILES)]):
         digest.update(path.read_bytes())
+    for path in _code_of_plug_ins():
+        digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+def _code_of_plug_ins() -> list[Path]:
+    """The modules that define effects of other packages, with the rest of their packages."""
+    found: set[Path] = set()
+    for effect in known_effects().values():
+        module = sys.modules[type(effect).__module__]
+        top = sys.modules[module.__name__.partition(".")[0]]
+        if top.__name__ != "workbench":
+            found.update(Path(file) for m in (module, top) if (file := getattr(m, "__file__", None)))
+            found.update(path for folder in getattr(top, "__path__", ()) for path in Path(folder).rglob("*.py"))
+    return sorted(found)
 
 
 class ModelKeys:

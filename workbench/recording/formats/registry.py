@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from workbench.files.plug_ins import of_folder, with_plug_ins
+from workbench.recording.formats.of_packages import answering_for
 from workbench.recording.recording import Recording
 
 ENTRY_POINT_GROUP = "workbench.formats"
@@ -18,10 +19,10 @@ class RecordingFormat:
     """One format. A package adds its own as an entry point of the group `workbench.formats` that names such an object.
 
     name: of recordings' `kind`. called: its name in messages, empty if it is only refused. matches: whether a file that begins
-    with these bytes (64 kB, or all; a text made plain as by `plain_table`) is of the format. read: the whole of it, InputError
-    where it is damaged. marks: the file by which a folder is recognised as a recording of the format. parts: names of the
-    recordings in a file or folder, empty if it holds just one; read_part: reads one of them. Formats are tried in order of
-    `priority`, then of name.
+    with these bytes (64 kB, or all; a text made plain as by `plain_table`: `;` and tabs between cells are commas there) is of the
+    format. read: the whole file as it is on disk, InputError where it is damaged. marks: the file by which a folder is
+    recognised as a recording of the format. parts: names of the recordings in a file or folder, empty if it holds just one;
+    read_part: reads one of them. Formats are tried in order of `priority`, then of name.
     """
 
     name: str
@@ -40,7 +41,8 @@ def known_formats() -> tuple[RecordingFormat, ...]:
     import workbench.recording.formats as room
 
     own = {known.name: known for known in of_folder(room, "FORMAT", RecordingFormat)}
-    found = with_plug_ins(own, ENTRY_POINT_GROUP, RecordingFormat, "format", lambda known, at: (known.name, known))
+    found = with_plug_ins(own, ENTRY_POINT_GROUP, RecordingFormat, "format",
+                          lambda known, at: (known.name, answering_for(known, at)))
     return tuple(sorted(found.values(), key=lambda f: (f.priority, f.name)))
 
 
