@@ -1,6 +1,6 @@
 """A torque that nobody has named against the names, on a robot that is linear in all its numbers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.evidence.torque_law import Functions, TorqueLaw
-from workbench.identify.evidence.unknown_law import carried_on, on_windows, with_unknown_law
+from workbench.identify.evidence.unknown_law import carried_on, on_windows, with_unknown_law, without_zero_groups
 
 AT = np.linspace(-90.0, 90.0, 19)
 PEAKS = np.exp(-0.5 * np.square((AT[:, None] - np.array([-60.0, -30.0, 0.0, 30.0, 60.0])) / 30.0))
@@ -109,6 +109,21 @@ def test_a_law_found_over_windows_is_fitted_to_whole_logs():
     assert {f.hypothesis.key for f in found.fits.values()} < {f.hypothesis.key for f in done.fits.values()}
     assert posterior_of(list(done.fits.values()), OPTIONS).unnamed > 0.95
     np.testing.assert_allclose(done.best.hypothesis.law.weights[:5], WEIGHTS[:5], atol=0.25 * 0.03)
+
+
+def test_groups_whose_weights_are_all_zero_are_no_part_of_a_law():
+    """A torque of 0 mN m RMS that depends on nothing was reported, with a confidence of 0.98."""
+    _, found, _ = weighed(robot({}, WEIGHTS))
+    f = found.best
+    both = f.hypothesis.law.at(WEIGHTS, {"angle": 0.03, "speed": 0.03})
+    beside = np.arange(2.0 * both.active.sum()).reshape(2, -1)
+    kept = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both), beside=beside))
+    assert dict(kept.hypothesis.law.scales) == {"angle": 0.03}
+    np.testing.assert_array_equal(kept.beside, beside[:, :5])
+    nothing = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both.at(0.0 * WEIGHTS)), beside=beside))
+    assert nothing.hypothesis.law is None
+    assert nothing.beside is None
+    assert without_zero_groups(kept) is kept
 
 
 def test_tables_hold_the_law():

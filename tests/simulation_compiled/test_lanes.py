@@ -42,6 +42,8 @@ def calls(monkeypatch) -> Calls:
         seen.lanes += 1
         play(*arguments)
 
+    lanes.stats = play.stats
+
     def one(*arguments):
         seen.alone += 1
         return alone(*arguments)
