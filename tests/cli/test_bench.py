@@ -47,7 +47,8 @@ def test_quick_bench_prints_and_writes_every_figure(tmp_path: Path, capsys: pyte
                  "compiled_against_drake_walking": differs, "compiled_against_mujoco_fixed_base": (0.01, 100),
                  "compiled_against_mujoco_free_base": (0.01, 100), "batch_on_two_threads": (0.1, 4),
                  "batch_on_two_processes": (0.1, 4), "fit_against_mujoco_sysid": (0.01, 1000),
-                 "servo_log_rollouts_against_mujoco": (0.01, 1000), "diagnose_time": (0, 0),
+                 "servo_log_rollouts_against_mujoco": (0.01, 1000), "servo_log_lanes_against_mujoco": (0.01, 1000),
+                     "servo_log_lanes_against_alone": (0.01, 1000), "diagnose_time": (0, 0),
                  **{f"captured_rollouts_{case}": (0.1, 1000) for case in ("held", "held_with_play", "walking")}}
     assert set(said["figures"]) == set(plausible)
     required = set()
