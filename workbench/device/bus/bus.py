@@ -51,7 +51,7 @@ class Bus:
         self.group_kind: group.Kind | Literal[""] = profile.group_read
         if strip_echo:
             self.port = StripEcho(port)
-        elif self._release_after(lambda: wire.hears_itself(port, profile.protocol)):
+        elif self._using_port(lambda: wire.hears_itself(port, profile.protocol)):
             raise wire.echo_error()
 
     # Time
@@ -62,11 +62,11 @@ class Bus:
 
     def wait_until(self, time: float) -> None:
         """Lets time go by until then [s]."""
-        self._release_after(lambda: self.port.pause(time - self.now()))
+        self._using_port(lambda: self.port.pause(time - self.now()))
 
     def pause(self, seconds: float) -> None:
         """Lets time go by."""
-        self._release_after(lambda: self.port.pause(seconds))
+        self._using_port(lambda: self.port.pause(seconds))
 
     def close(self) -> None:
         """Gives the port back; one that is gone is none."""
@@ -140,13 +140,13 @@ class Bus:
         wanted, first, count = self._block(names)
         packet = group.question(kind, servos, first, count)
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
-        heard = self._release_after(lambda: wire.collect(self.port, packet, group.reply_length(kind, len(servos), count)))
+        heard = self._using_port(lambda: wire.collect(self.port, packet, group.reply_length(kind, len(servos), count)))
         out = {}
         for servo, (error, data) in group.answers(kind, heard, count, servos).items():
             self._look(servo, error)
             out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
         if heard and len(out) < len(servos):
-            self._release_after(lambda: wire.wait_for_silence(self.port))
+            self._using_port(lambda: wire.wait_for_silence(self.port))
         return out
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
@@ -162,7 +162,7 @@ class Bus:
         sent, frame = self.now(), 8 if self.profile.protocol == 1 else 14
         for some in _split(packed, LONGEST // (length + 1)):
             parameters = list(b"".join(some))
-            result = self._release_after(lambda: self._handler.syncWriteTxOnly(
+            result = self._using_port(lambda: self._handler.syncWriteTxOnly(
                 self.port, registers[0].address, length, parameters, len(parameters)))  # noqa: B023
             if result != COMM_SUCCESS:
                 raise BusError(f"could not be sent: {self._handler.getTxRxResult(result)}")
@@ -203,11 +203,11 @@ class Bus:
         """Who answers at which of the family's bit rates; the port's own is set again."""
         wanted, own, found = list(servos), int(self.port.getBaudRate()), {}
         for rate in sorted(set(self.profile.bit_rates.values()), reverse=True):
-            if self._release_after(lambda: self.port.setBaudRate(rate)):  # noqa: B023
+            if self._using_port(lambda: self.port.setBaudRate(rate)):  # noqa: B023
                 here = self.find(wanted)
                 if here:
                     found[rate] = here
-        self._release_after(lambda: self.port.setBaudRate(own))
+        self._using_port(lambda: self.port.setBaudRate(own))
         return found
 
     def answers(self, servo: int) -> int:
@@ -215,7 +215,7 @@ class Bus:
         again."""
         protocol = self.profile.protocol
         packet, most = wire.ping(protocol, servo), 24 if protocol == 1 else 56
-        heard = [self._release_after(lambda: wire.hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
+        heard = [self._using_port(lambda: wire.hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
         if not any(heard):
             return 0
         return 2 if sum(bool(answer) and not wire.clean(protocol, answer) for answer in heard) >= 3 else 1
@@ -248,7 +248,7 @@ class Bus:
         """An answer, asked for again and again; its error byte is the servo's alarms, or a refusal."""
         joint, result = self.joints.get(servo), COMM_SUCCESS
         for attempt in range(self.options.tries):
-            data, result, error = self._release_after(call)
+            data, result, error = self._using_port(call)
             if result == COMM_SUCCESS and len(data) == count:
                 if attempt:
                     self.retries[servo] += attempt
@@ -257,7 +257,7 @@ class Bus:
                     raise BusError(f"refused: {refused}", servo, joint, register)
                 return data
             if result in (COMM_RX_CORRUPT, COMM_SUCCESS):
-                self._release_after(lambda: wire.wait_for_silence(self.port))
+                self._using_port(lambda: wire.wait_for_silence(self.port))
         how = "only broken answers" if result in (COMM_RX_CORRUPT, COMM_SUCCESS) else "no answer"
         raise NoAnswerError(f"{how} in {self.options.tries} tries", servo, joint, register)
 
@@ -269,7 +269,7 @@ class Bus:
             return ", ".join(name for bit, name in profile.refusals.items() if error >> bit & 1)
         if error & 0x80 and "hardware_error" in profile.registers:
             register = profile.registers["hardware_error"]
-            data, result, _ = self._release_after(
+            data, result, _ = self._using_port(
                 lambda: self._handler.readTxRx(self.port, servo, register.address, register.size))
             bits = register.decode(bytes(data)) if result == COMM_SUCCESS and data else 0
             self.alarms[servo] = tuple(name for bit, name in profile.alarms.items() if bits >> bit & 1) or ("unknown",)
@@ -277,7 +277,7 @@ class Bus:
             self.alarms[servo] = ()
         return profile.refusals.get(error & 0x7F, f"error {error & 0x7F}") if error & 0x7F else ""
 
-    def _release_after(self, call: Callable[[], T]) -> T:
+    def _using_port(self, call: Callable[[], T]) -> T:
         """Whatever happens, the port may be used again afterwards."""
         try:
             return call()
