@@ -41,8 +41,10 @@ _found: set[object] = set()
 def is_compiled(kernel: Any) -> bool:
     """Whether a kernel of this checkout was compiled on this machine before: else its first run takes a minute longer. numba
     keeps code by the path of its source, so that another checkout of the same code does not count."""
+    if kernel in _found:
+        return True
     folder = kernel.stats.cache_path
-    if kernel not in _found and folder is not None and any(Path(folder).glob(f"*.{kernel.__name__}-*.nbc")):
+    if folder is not None and any(Path(folder).glob(f"*.{kernel.__name__}-*.nbc")):
         _found.add(kernel)
     return kernel in _found
 
