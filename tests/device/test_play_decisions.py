@@ -1,4 +1,4 @@
-"""Each decision of the player by itself: what it leaves behind, what it refuses, how far and how fast its ramps go."""
+"""Single decisions of the player: the state in which it leaves the servos, its refusals, the reach and speed of its ramps."""
 
 import math
 

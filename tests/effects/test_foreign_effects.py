@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import refused
+from tests.plug_in import install_plug_in
 from workbench.api.doctor import examine
 from workbench.effects.apply import physics_of
 from workbench.effects.base import Effect
@@ -35,13 +36,7 @@ Install = Callable[[str], None]
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     def write(text: str) -> None:
-        (tmp_path / "cap_bad.py").write_text(text)
-        info = tmp_path / "cap_bad-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cap-bad\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{ENTRY_POINT_GROUP}]\ncap = cap_bad:EFFECT\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(__import__("sys").modules, "cap_bad", raising=False)
+        install_plug_in(tmp_path, monkeypatch, "cap_bad", text, ENTRY_POINT_GROUP, "cap = cap_bad:EFFECT")
         known_effects.cache_clear()
 
     yield write

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.plug_in import install_plug_in
 from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.registry import ENTRY_POINT_GROUP, known_formats
@@ -27,13 +28,8 @@ Install = Callable[[str], Path]
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     def write(line: str) -> Path:
-        (tmp_path / "hex_log.py").write_text(READER.replace("{line}", line))
-        info = tmp_path / "hex_log-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hex-log\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{ENTRY_POINT_GROUP}]\nhex = hex_log:FORMAT\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(__import__("sys").modules, "hex_log", raising=False)
+        text = READER.replace("{line}", line)
+        install_plug_in(tmp_path, monkeypatch, "hex_log", text, ENTRY_POINT_GROUP, "hex = hex_log:FORMAT")
         known_formats.cache_clear()
         log = tmp_path / "log.txt"
         log.write_text(f"hex;log;1;2\n# {line}\n")
