@@ -23,7 +23,7 @@ SHARED = ("of a held arm's servo log, each with other frictions of one joint; bu
 NAMES = {"servo_log_rollouts_against_mujoco": ("mujoco", "alone", "this library's rollouts, one by one, over MuJoCo's"),
          "servo_log_lanes_against_mujoco": ("mujoco", "lanes", "this library's rollouts, in lanes, over MuJoCo's"),
          "servo_log_lanes_against_alone": ("alone", "lanes", "rollouts played together in lanes over the same one by one")}
-"""Figures: the slower, the faster, and what the ratio means."""
+"""Figures: the slower, the faster, and the meaning of their ratio."""
 
 
 def servo_log_rollouts(duration: float, models: int, repeats: int, seed: int) -> list[Figure]:
