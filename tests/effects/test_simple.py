@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from tests.plug_in import install_plug_in
 from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of
 from workbench.effects.base import Effect, si_values
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
@@ -367,12 +368,7 @@ def install(tmp_path, monkeypatch):
     """Installs a distribution that offers an entry point, as pip would write it; a function of module text and entry."""
 
     def write(module: str, text: str, entry: str) -> None:
-        (tmp_path / f"{module}.py").write_text(text)
-        info = tmp_path / f"{module}-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{ENTRY_POINT_GROUP}]\ngum = {module}:{entry}\n")
-        monkeypatch.syspath_prepend(tmp_path)
+        install_plug_in(tmp_path, monkeypatch, module, text, ENTRY_POINT_GROUP, f"gum = {module}:{entry}")
         known_effects.cache_clear()
 
     yield write
