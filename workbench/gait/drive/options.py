@@ -53,5 +53,5 @@ class DriveOptions:
     def __post_init__(self) -> None:
         check_choice("law", self.law, ("mpc", "proportional"))
         check_whole(self, horizon=2)
-        check_positive(self, "most", "most_change", "aside", "turned", "change", "side_change", "reach", "drift", "first_bias",
-                       "first_gain", "noise", "stride_gain", "blind", "clearance", "inside")
+        check_positive(self, "most", "most_change", "most_side", "most_side_change", "aside", "turned", "change", "side_change",
+                       "reach", "drift", "first_bias", "first_gain", "noise", "stride_gain", "blind", "clearance", "inside")
