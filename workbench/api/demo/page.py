@@ -84,7 +84,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     lengths = [_end(take)[0] for take in takes.values()]
     report = Report(
         "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and "
-        f"contact. Of an arm: {diagnosed.said}",
+        f"contact. The bundled arm: {diagnosed.said}",
         _SUMMARY, [(label, f"{_end(t)[0]:.1f} cm", f"heading {_heading(t):+.1f}°") for label, t in takes.items()],
         Provenance.of(model, seconds=time.monotonic() - began))
     report.add(_walk_section(rows, takes, model, folder))
