@@ -119,8 +119,8 @@ def criteria(scores: Sequence[Score]) -> list[Criterion]:
         Criterion("confidence bins whose 95 % interval contains the diagonal", "all", held / len(bins) if bins else None,
                   f"{held} of {len(bins)}", held == len(bins) if bins else None),
         _share("90 % intervals that contain the true size", "85 to 95 %", inside, len(given), 0.85, 0.95),
-        Criterion("median relative error of the sizes", "at most 15 %", median, "–" if median is None else f"{100 * median:.0f} %",
-                  None if median is None else median <= 0.15),
+        Criterion("median relative error of the sizes", "at most 15 %", median,
+                  "–" if median is None else f"{100 * median:.0f} %", None if median is None else median <= 0.15),
     ]
 
 
