@@ -98,7 +98,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
     return out
 
 
-def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int = 2, progress: Progress = no_progress
+def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int, progress: Progress = no_progress
                     ) -> list[Rollouts]:
     """Like `roll_out`, but the compiled station computes the finer steps of each run in which it supports the nominal step and
     agrees with Drake there."""

@@ -46,15 +46,16 @@ def foot_phases(take: Take, model: RobotModel) -> dict[str, FootPhases]:
     return out
 
 
-def force_phases(take: Take, least: float = 0.05) -> dict[str, FootPhases]:
-    """Stance of each foot from a simulation's contact forces: more than `least` of the mean total load."""
+def force_phases(take: Take) -> dict[str, FootPhases]:
+    """Stance of each foot from a simulation's contact forces: more than `COMPARE.stance_load` of the mean total load. Empty for a
+    take without forces."""
     if not take.contact:
         return {}
     load = {foot: f[:, 2] for foot, f in take.contact.items()}
     total = float(np.nanmean(np.sum(list(load.values()), axis=0)))
     if not total > 0:
         return {}
-    return {foot: _phases(take, f > least * total, np.isfinite(f)) for foot, f in load.items()}
+    return {foot: _phases(take, f > COMPARE.stance_load * total, np.isfinite(f)) for foot, f in load.items()}
 
 
 def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:

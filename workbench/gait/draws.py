@@ -24,6 +24,8 @@ CHANCE = 0.3
 """Largest probability with which a screening may refuse a gait that nine of ten robots keep."""
 OVER_DRAWS = " over draws"
 """Ends the name of a limit that is judged on draws."""
+CONFIDENCE = 0.95
+"""Of the bound on the share of robots that fall."""
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 FEWEST = 20
 """Draws from which a 5th percentile says more than the smallest value: of fewer, less than one robot is below it."""
@@ -86,11 +88,11 @@ def foot_speed(machine: GaitMachine, request: Request, m: GaitMeasure) -> float:
     return abs(m.turn_rate) * machine.arm
 
 
-def bound(events: int, count: int, confidence: float = 0.95) -> float:
-    """Largest probability of an event that this many in `count` trials leave open at the confidence (Clopper and Pearson)."""
+def bound(events: int, count: int) -> float:
+    """Largest probability of an event that `events` in `count` trials leave open at CONFIDENCE (Clopper and Pearson)."""
     from scipy.stats import beta
 
-    return 1.0 if count <= events else float(beta.ppf(confidence, events + 1, count - events))
+    return 1.0 if count <= events else float(beta.ppf(CONFIDENCE, events + 1, count - events))
 
 
 def _required_count(count: int) -> int:

@@ -26,6 +26,9 @@ from workbench.recording.servo_log.plausibility import beyond_range
 from workbench.recording.take_from import named_by_model
 from workbench.robot import RobotModel
 
+_IN_FULL = 3
+"""Problems that a line states in full."""
+
 
 class Part(NamedTuple):
     """Part of a session that has problems. kind: "robot", one "take", all "takes", or one prediction ("predict"). name: of a take
@@ -67,7 +70,7 @@ class SessionCheck:
             if part in self.damaged:
                 out += [f"{part} left out: {bad[0]}"] if part.kind == "take" else []
             elif bad:
-                out.append(f"{part}: {summed_up(bad)}")
+                out.append(f"{part}: {summarize(bad)}")
         return out
 
 
@@ -185,10 +188,10 @@ def serious(problems: Sequence[str]) -> list[str]:
     return [text for text in problems if not isinstance(text, RoutineProblem)]
 
 
-def summed_up(problems: Sequence[str], most: int = 3) -> str:
+def summarize(problems: Sequence[str]) -> str:
     """Several problems in one line: the first few in full, the rest counted."""
-    more = f" (and {len(problems) - most} more: see workbench inspect)" if len(problems) > most else ""
-    return "; ".join(problems[:most]) + more
+    more = f" (and {len(problems) - _IN_FULL} more: see workbench inspect)" if len(problems) > _IN_FULL else ""
+    return "; ".join(problems[:_IN_FULL]) + more
 
 
 def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:

@@ -17,6 +17,8 @@ TICKS = 10_000_000
 """Ticks per second of the server's clock, as Windows counts them."""
 LATENCY = 4e-3
 """From mid-exposure to the frame on the network [s]."""
+DELAY = 0.2e-3
+"""Of a packet to or from the server [s], as on a local network."""
 _SENDER = struct.Struct("<256s4B4B")
 
 Pose = tuple[tuple[float, float, float], tuple[float, float, float, float], bool]
@@ -200,10 +202,10 @@ class VirtualMotive:
 
 
 class VirtualLink:
-    """An emulated server in this process; waiting costs virtual time only. delay: of each packet, either way [s]."""
+    """An emulated server in this process; waiting costs virtual time only."""
 
-    def __init__(self, server: VirtualMotive, delay: float = 0.2e-3) -> None:
-        self._server, self._delay, self._now = server, delay, server.started
+    def __init__(self, server: VirtualMotive) -> None:
+        self._server, self._now = server, server.started
         self._waiting: list[tuple[float, bytes]] = []
 
     @property
@@ -217,7 +219,7 @@ class VirtualLink:
 
     def send(self, data: bytes) -> None:
         """Sends a packet to the server; InputError where it cannot be reached."""
-        self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
+        self._waiting += [(self._now + 2 * DELAY, a) for a in self._server.answer(data, self._now + DELAY)]
 
     def subscribe(self, info: ServerInfo) -> None:
         """Nothing to join: the emulated server sends to this link."""

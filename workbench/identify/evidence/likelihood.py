@@ -97,10 +97,10 @@ class Likelihood:
         return -float(found.fun), float(np.exp(found.x))
 
 
-def correlation_time(parts: list[tuple[Array, float]], window: float = 5.0) -> float:
+def correlation_time(parts: list[tuple[Array, float]]) -> float:
     """Integrated autocorrelation time [s] of residuals, of takes (values with NaN where unseen, time between frames [s])
-    together: half the frame time where frames are independent. Summed until it is `window` correlation times long (A. Sokal,
-    Monte Carlo methods in statistical mechanics, 1997, section 3)."""
+    together: half the frame time where frames are independent. Summed until it is NUMERICS.window correlation times long (A.
+    Sokal, Monte Carlo methods in statistical mechanics, 1997, section 3)."""
     frame = float(np.median([dt for _, dt in parts]))
     longest = max(len(x) for x, _ in parts)
     products, pairs = np.zeros(longest), np.zeros(longest)
@@ -112,7 +112,7 @@ def correlation_time(parts: list[tuple[Array, float]], window: float = 5.0) -> f
     if rho[0] <= 0:
         return frame / 2
     tau = 0.5 + np.cumsum(rho[1:] / rho[0])
-    ends = np.flatnonzero(np.arange(1, len(tau) + 1) >= window * tau)
+    ends = np.flatnonzero(np.arange(1, len(tau) + 1) >= NUMERICS.window * tau)
     return float(frame * max(0.5, tau[ends[0] if len(ends) else -1])) if len(tau) else frame / 2
 
 
