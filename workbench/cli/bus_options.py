@@ -20,9 +20,9 @@ VIRTUAL = "virtual"
 
 def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None:
     """--port, --rate, --echo, --robot."""
-    said = default or "the only USB adapter"
+    default_port = default or "the only USB adapter"
     parser.add_argument("--port", metavar="PORT", default=default,
-                        help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {said})")
+                        help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {default_port})")
     parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S",
                         help="baud rate of the servo bus (default: 1000000)")
     parser.add_argument("--echo", action="store_true", help="the adapter echoes its own transmissions")

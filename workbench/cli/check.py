@@ -36,10 +36,10 @@ def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[st
     return found.damaged_takes
 
 
-def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:
+def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], warned: frozenset[str] = frozenset()) -> None:
     """Names the takes that were left out and why, except those already reported (`told`) before the work."""
     for name, reason in left_out:
-        if name not in told:
+        if name not in warned:
             print(f"workbench {verb}: warning: take '{name}' left out: {reason}", file=sys.stderr)
 
 

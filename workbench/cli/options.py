@@ -40,10 +40,10 @@ def add_packages(parser: argparse.ArgumentParser) -> None:
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
     """--out: the folder for results."""
-    said = "; created if missing, other files in it are kept"
+    kept = "; created if missing, other files in it are kept"
     parser.add_argument(
         "--out", metavar="DIR", type=_folder, required=default is None, default=default and Path(default),
-        help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))
+        help=f"folder for the results{kept}" + (f" (default: {default})" if default else ""))
 
 
 def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:

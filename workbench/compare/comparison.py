@@ -65,9 +65,9 @@ def noise_of(takes: Sequence[Take]) -> Noise:
     for joint in dict.fromkeys(j for t in takes for j in t.joints):
         seen = [t for t in takes if joint in t.joints]
         joints[joint] = float(metrics.noise_at_rest([t.q[t.resting, t.column(joint)][:, None] for t in seen])[0])
-        told = [t.q_sigma[:, t.column(joint)] for t in seen if t.q_sigma is not None and not t.zeroed]
-        if told and np.isfinite(np.concatenate(told)).any():
-            joints[joint] = float(np.fmax(joints[joint], np.nanmedian(np.concatenate(told))))
+        sigmas = [t.q_sigma[:, t.column(joint)] for t in seen if t.q_sigma is not None and not t.zeroed]
+        if sigmas and np.isfinite(np.concatenate(sigmas)).any():
+            joints[joint] = float(np.fmax(joints[joint], np.nanmedian(np.concatenate(sigmas))))
     paths = [t.p_WB[t.resting] for t in takes if t.p_WB is not None]
     return Noise(joints, float(np.linalg.norm(metrics.noise_at_rest(paths))) if paths else NAN)
 

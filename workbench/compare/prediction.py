@@ -82,8 +82,8 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
 def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
     """The yaw [rad] of a session of predictions alone, from where the bodies stand: good to some degrees, as pivots lie
     anywhere on their links. InputError where that does not give it."""
-    told = [layout_yaw(tracks_of(start), session.model) for start in starts]
-    known = [yaw for yaw in told if yaw is not None]
+    yaws = [layout_yaw(tracks_of(start), session.model) for start in starts]
+    known = [yaw for yaw in yaws if yaw is not None]
     if not known:
         raise InputError(session.path, "yaw: is missing, and cannot be found from takes, nor from where the bodies of the "
                          "start files stand")

@@ -219,12 +219,12 @@ class InverseDynamics:
         seen = np.asarray(np.isfinite(q).any(axis=0))
         unseen = [j for j, s in zip(self.model.joints, seen) if not s]
         held = np.zeros_like(q)
-        told = take.commands is not None and np.isfinite(take.starts_at)
-        if told:
+        commanded = take.commands is not None and np.isfinite(take.starts_at)
+        if commanded:
             assert take.commands is not None
             held = take.commands.reordered(self.model.joints).reference(take.since_start)
         if unseen:
-            problems.append(f"{', '.join(unseen)}: not seen; held at {'the commanded angle' if told else 'zero'}")
+            problems.append(f"{', '.join(unseen)}: not seen; held at {'the commanded angle' if commanded else 'zero'}")
         if take.zeroed:
             q = q + np.array([rest.get(j, 0.0) for j in self.model.joints])
             if not rest:

@@ -64,10 +64,12 @@ class Experiment:
     separations: tuple[Separation, ...]
 
     def entry(self, file: str = "next_experiment.csv") -> NextExperiment | None:
-        """For findings.json; None where nothing would be separated."""
-        told = [s for s in self.separations if s.separated]
-        return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
-                              ) if told else None
+        """The experiment's entry in findings.json; None where nothing would be separated. file: name of the motion's file."""
+        separated = [s for s in self.separations if s.separated]
+        if not separated:
+            return None
+        ratios = tuple(s.log_likelihood_ratio for s in separated)
+        return NextExperiment(file, self.base, tuple(s.effects for s in separated), ratios)
 
 
 def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]],
@@ -174,8 +176,8 @@ class _Bench:
         frames = np.concatenate([np.r_[span] for name, span in spans(chosen, self.sight.rate).items() if name in named])
 
         def play(models: Sequence[RobotModel]) -> list[Array]:
-            said = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
-            return [project(take, self.sight)[frames].ravel() for take in self.runs.play_all(models, [chosen], said)[0]]
+            stage = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
+            return [project(take, self.sight)[frames].ravel() for take in self.runs.play_all(models, [chosen], stage)[0]]
 
         known = Shown.join([tried[name] for name in named])
         a, b = play(pair.models)

@@ -262,10 +262,10 @@ def top_of(path: Path, *keys: str) -> Fields:
         raise InputError(path, "top level: expected a mapping, as in a session.yaml or a model.yaml "
                                "(`workbench inspect` recognises other files)")
     top = Fields(path, content)
-    said = top.raw("format")
-    if said is None:
+    version = top.raw("format")
+    if version is None:
         top.only("format", *keys)
-    if said != 1:
+    if version != 1:
         raise top.error("format", "expected 1")
     top.only(*keys)
     return top

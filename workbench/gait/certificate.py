@@ -175,8 +175,8 @@ def hashes(**tables: PoseTable) -> dict[str, str]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    said = json.dumps(plain({k: v for k, v in content.items() if k != "sha256"}), sort_keys=True)
-    return hashlib.sha256(said.encode()).hexdigest()
+    text = json.dumps(plain({k: v for k, v in content.items() if k != "sha256"}), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def plain(value: Any) -> Any:

@@ -81,11 +81,11 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     cycle: LimitCycle | None = next(results) if options.watched else None
     robots_drawn = [d for group in _take(results, len(groups)) for d in group]
     walks = [w for group in results for w in group]
-    told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
+    draw_results, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if straightener is not None:
-        told["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
+        draw_results["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
     if checks:
-        told["the same in Drake"] = _checked(request, checks, options)
+        draw_results["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
                *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
                *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
@@ -97,7 +97,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
         asked=request.to_plain(), tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
-        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=told, floor=floor,
+        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=draw_results, floor=floor,
         other_engine=elsewhere, ways=run.ways, cycle=_cycle(cycle, run.measure, on_draws), shape=asdict(table.shape),
         provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
     return Certified(certificate, run.take, run.cycles, request)
@@ -142,10 +142,10 @@ def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]]
 def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> Steadiness:
     """How the gait repeats, from cycle to cycle, and from where it comes back to that."""
     walked = [math.degrees(m.scatter[1]) for m in draws if not m.fell and math.isfinite(m.scatter[1])]
-    told = Steadiness(nominal.scatter[0], math.degrees(nominal.scatter[1]), float(np.median(walked)) if walked else None)
+    steadiness = Steadiness(nominal.scatter[0], math.degrees(nominal.scatter[1]), float(np.median(walked)) if walked else None)
     if cycle is None:
-        return told
-    return replace(told, watched=cycle.watched, back={r.entry: r.cycles for r in cycle.returns},
+        return steadiness
+    return replace(steadiness, watched=cycle.watched, back={r.entry: r.cycles for r in cycle.returns},
                    fell=tuple(r.entry for r in cycle.returns if r.fell))
 
 

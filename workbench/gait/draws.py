@@ -132,23 +132,23 @@ class Drawn:
 
 def drawn(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
     """Of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake played it."""
-    said = ""
+    incident = ""
     if measure.fell:
-        said = f"fell: tilt {math.degrees(measure.tilt):.0f} deg"
+        incident = f"fell: tilt {math.degrees(measure.tilt):.0f} deg"
     elif gave_up:
         went = f"{float(np.hypot(*measure.velocity)):.2f} m/s, tilt {math.degrees(measure.tilt):.0f} deg"
-        said = f"something other than a foot touched; it went on at {went}"
+        incident = f"something other than a foot touched; it went on at {went}"
     kept = replace(measure, clearance=feet.clearance, slip=feet.slip, touched=gave_up and not measure.fell)
-    return Drawn(described(model), kept, feet, said)
+    return Drawn(described(model), kept, feet, incident)
 
 
 def described(model: RobotModel) -> str:
     """What stands out of a drawn robot: its floor and its supply."""
     words = {"ground_friction": ("friction", "friction {:.2f}"), "supply_voltage": ("voltage", "{:.1f} V"),
              "supply_sag": ("drop", "{:.2f} V sag a servo")}
-    told = [(words[e.effect], e.parameters) for e in model.effects if e.effect in words and not e.where]
-    said = [form.format(parameters[name]) for (name, form), parameters in told]
-    return ", ".join(said) or "the nominal robot"
+    drawn_effects = [(words[e.effect], e.parameters) for e in model.effects if e.effect in words and not e.where]
+    words_of = [form.format(parameters[name]) for (name, form), parameters in drawn_effects]
+    return ", ".join(words_of) or "the nominal robot"
 
 
 def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
@@ -166,13 +166,13 @@ def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
         "tipping margin deg": [math.degrees(d.feet.tipping) for d in standing],
         "electrical power W": [d.measure.power for d in standing],
         "largest RMS torque N m": [max(d.measure.rms) for d in standing]}
-    told: dict[str, Any] = {k: _quantiles(np.array(v), len(robots)) for k, v in values.items()}
+    out: dict[str, Any] = {k: _quantiles(np.array(v), len(robots)) for k, v in values.items()}
     falls = sum(m.fell for m in measures)
-    told["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
-    told["worse half of speeds"] = worse_half(values[f"speed {request.unit}"])
+    out["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
+    out["worse half of speeds"] = worse_half(values[f"speed {request.unit}"])
     incidents = [{"draw": k + 1, "robot": d.robot, "what": d.incident} for k, d in enumerate(robots) if d.incident]
-    return told | {"count": len(robots), "falls": falls, "falls at most": bound(falls, len(robots)), "quantiles": list(QUANTILES),
-                   "incidents": incidents}
+    return out | {"count": len(robots), "falls": falls, "falls at most": bound(falls, len(robots)), "quantiles": list(QUANTILES),
+                  "incidents": incidents}
 
 
 def _quantiles(values: NDArray[np.float64], count: int) -> list[float | None]:

@@ -72,11 +72,11 @@ class Ensemble:
     @property
     def sha256(self) -> str:
         """Of everything that is drawn."""
-        said = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
+        content = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
         if self.posterior is not None:
-            said += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),
-                     np.asarray(self.posterior.covariance).tolist()]
-        return hashlib.sha256(repr(said).encode()).hexdigest()
+            content += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),
+                        np.asarray(self.posterior.covariance).tolist()]
+        return hashlib.sha256(repr(content).encode()).hexdigest()
 
     def _draw(self, model: RobotModel, legs: list[str], rng: np.random.Generator, folder: Path,
               values: Mapping[str, float]) -> RobotModel:

@@ -42,9 +42,9 @@ def table_sha256(*tables: PoseTable) -> str:
     """Parts of the firmware's table: joints, goals, speeds, dwells, and which poses are played once."""
     digest = hashlib.sha256()
     for t in tables:
-        said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
-                **({"start": t.start, "stop": t.stop} if t.start or t.stop else {})}
-        digest.update(json.dumps(said).encode())
+        content = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
+                   **({"start": t.start, "stop": t.stop} if t.start or t.stop else {})}
+        digest.update(json.dumps(content).encode())
     return digest.hexdigest()
 
 
@@ -112,9 +112,9 @@ class Evaluator:
         out = [self._candidate(t, margins, nominal.get(id(t))) for t, margins in tables]
         chosen = [c for c in (keep(out) if keep else out) if c.nominal is not None and not c.nominal.fell] if draws else []
         robots = self.draws[:draws]
-        told = self._measures([(c.table, robot) for robot in robots for c in chosen])
+        on_robots = self._measures([(c.table, robot) for robot in robots for c in chosen])
         for i, c in enumerate(chosen):
-            measures = tuple(told[i + k * len(chosen)] for k in range(len(robots)))
+            measures = tuple(on_robots[i + k * len(chosen)] for k in range(len(robots)))
             out[next(k for k, o in enumerate(out) if o is c)] = self._judge(c.table, [m for m in c.margins if _of_table(m)],
                                                                             c.nominal, measures)
         return out

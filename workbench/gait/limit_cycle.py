@@ -83,9 +83,9 @@ def limit_cycle(model: RobotModel, table: GaitTable, watched: int, step: float =
     own = cycles_of(first, neutral.begin, period)
     scatter = scatter_of(own[-SETTLED:])
     entries = [*_entries(table, watched, other), _pushed(first, table, watched, model)]
-    told = [came_back(neutral.name, first, own, own)]
-    told += [came_back(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
-    return LimitCycle(scatter, tuple(told), watched)
+    returns = [came_back(neutral.name, first, own, own)]
+    returns += [came_back(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
+    return LimitCycle(scatter, tuple(returns), watched)
 
 
 def came_back(name: str, take: Take, cycles: Array, own: Array) -> Return:

@@ -150,8 +150,8 @@ def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:
     slowest = cycle.slowest
     if slowest.cycles is None:
         use = max(2.0, cycle.watched / limits.back)
-        said = "cycles, fell" if slowest.fell else "cycles, not returned"
-        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), said, use)
+        unit = "cycles, fell" if slowest.fell else "cycles, not returned"
+        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), unit, use)
     return _of("way back to its cycle", slowest.entry, slowest.cycles, limits.back, "cycles")
 
 

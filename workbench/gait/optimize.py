@@ -127,14 +127,14 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
-            said = {**provenance, "finalist": finalist, **told_of_plan(c, plans)}
-            return table, certify(machine, request, table, draws.certifying(), examined, progress, said, other)
+            origin = {**provenance, "finalist": finalist, **told_of_plan(c, plans)}
+            return table, certify(machine, request, table, draws.certifying(), examined, progress, origin, other)
 
-        def finished(met: bool, said: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
+        def finished(met: bool, problem: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
             planned = plans.of(table.shape)
             comparison = (None if planned is None else
                           compare_plan(machine, planned, table, certified.take, certified.cycles))
-            return Optimized(request, met, said, table, certified, found, comparison)
+            return Optimized(request, met, problem, table, certified, found, comparison)
 
         refused: list[Candidate] = []
         certified: list[tuple[GaitTable, Certified]] = []
@@ -156,10 +156,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             return finished(False, _unmet(request, best.certificate.margins, None), table, best, found)
         binds = min(refused, key=Candidate.rank, default=found.best)
         nearest = _nearest(found, refused)
-        said = _unmet(request, binds.margins, nearest)
+        problem = _unmet(request, binds.margins, nearest)
         if nearest is None:
-            return Optimized(request, False, said, None, None, found)
-        return finished(False, said, *examine(nearest, _briefly(options.certify), 0), found)
+            return Optimized(request, False, problem, None, None, found)
+        return finished(False, problem, *examine(nearest, _briefly(options.certify), 0), found)
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
@@ -219,16 +219,16 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
              progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
     """Of a speed that no gait has: the nearest table, after a first look for the fastest. On a slope on which nothing stands, or
     with servos that may not even hold it up, there is none."""
-    said = f"cannot be met by any gait: {impossible}"
+    problem = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
-        return Optimized(request, False, said, None, None, None)
-    progress(f"{said}; looking for the nearest that works", None)  # before the search, which takes half a minute
+        return Optimized(request, False, problem, None, None, None)
+    progress(f"{problem}; looking for the nearest that works", None)  # before the search, which takes half a minute
     look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
-        said += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
-    return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
+        problem += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
+    return Optimized(request, False, problem, nearest.table, nearest.certified, nearest.found)
 
 
 def walk_speed(model: RobotModel) -> float:
@@ -262,13 +262,13 @@ def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Pat
 
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
     """One line: the binding limit, its excess, and the achievable value."""
-    said = f"{request}: not met"
+    problem = f"{request}: not met"
     limit = binding(_without_speed(margins))
     if limit is not None:
-        said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
+        problem += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if nearest is not None:
-        said += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
-    return said
+        problem += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
+    return problem
 
 
 def _without_speed(margins: Sequence[Margin]) -> list[Margin]:

@@ -171,9 +171,9 @@ class _Run:
         return request.speed is not None and request.aim == "speed" and self._streak >= self.budget.enough
 
     def _note(self, candidates: Sequence[Candidate]) -> None:
-        told = [c for c in candidates if len(c.draws) >= self.draws]
-        self._seen += told
-        for c in told or candidates:
+        judged_on_draws = [c for c in candidates if len(c.draws) >= self.draws]
+        self._seen += judged_on_draws
+        for c in judged_on_draws or candidates:
             if self.best is None or (self._known(c), *c.rank()) < (self._known(self.best), *self.best.rank()):
                 self.best = c
             if keeps_all_but_speed(c) and (self.nearest is None or self._speed(c) > self._speed(self.nearest)):
@@ -193,9 +193,9 @@ class _Run:
             return ""
         limit = binding(self.best.margins)
         speed, unit = self._speed(self.best), self.evaluator.request.unit
-        said = f"{math.degrees(speed):.0f} deg/s" if unit == "rad/s" else f"{speed:.3f} m/s"
+        pace = f"{math.degrees(speed):.0f} deg/s" if unit == "rad/s" else f"{speed:.3f} m/s"
         broken = "" if self.best.good else "; not yet within limits"
-        return f": {said}{broken}; binds: {limit}" if limit else f": {said}"
+        return f": {pace}{broken}; binds: {limit}" if limit else f": {pace}"
 
 
 def _kind(c: Candidate) -> tuple[str, tuple[int, int]]:

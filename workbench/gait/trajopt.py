@@ -66,13 +66,13 @@ def plan(machine: GaitMachine, task: Task) -> Planned:
     """Solves the programme, with SNOPT, and if that fails with IPOPT."""
     began = time.perf_counter()
     programme = _Programme(machine, task)
-    told = None
+    result = None
     for solver in (SnoptSolver(), IpoptSolver()):
-        told = solver.Solve(programme.prog, programme.guess, programme.options)
-        if told.is_success():
+        result = solver.Solve(programme.prog, programme.guess, programme.options)
+        if result.is_success():
             break
-    assert told is not None
-    return programme.read(told, time.perf_counter() - began)
+    assert result is not None
+    return programme.read(result, time.perf_counter() - began)
 
 
 class _Programme:
@@ -192,15 +192,15 @@ class _Programme:
             guess = self.guess_q[:, columns]
             prog.AddQuadraticErrorCost(0.1 * np.eye(q.size), guess.flatten(), q.flatten())
 
-    def read(self, told: object, seconds: float) -> Planned:
+    def read(self, result: object, seconds: float) -> Planned:
         """The solution, and the shape nearest to it."""
-        get = told.GetSolution  # type: ignore[attr-defined]
+        get = result.GetSolution  # type: ignore[attr-defined]
         q = np.zeros((self.N, len(self.machine.model.joints)))
         for columns, variables in zip(self.columns, self.q):
             q[:, columns] = get(variables)
         p, tilt, place = get(self.p), get(self.tilt), get(self.place)
         forces = get(self.f).reshape(self.N, len(self.legs), 3)
-        return Planned(self.task, bool(told.is_success()), told.get_solver_id().name(), seconds, q,  # type: ignore[attr-defined]
+        return Planned(self.task, bool(result.is_success()), result.get_solver_id().name(), seconds, q,  # type: ignore[attr-defined]
                        self.path.stance, forces, p, tilt, self._nearest(p, tilt, place))
 
     def _nearest(self, p: Array, tilt: Array, place: Array) -> GaitShape:

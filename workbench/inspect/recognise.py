@@ -76,9 +76,9 @@ class Inspection:
             "gaps": None if self.share_of_gaps is None else f"{100 * self.share_of_gaps:.2f} %",
             **{f"  {name}": f"{100 * share:.2f} %" for name, share in list(self.gaps.items())[:_LISTED]},
             **{key: (_names(value) or "none") if isinstance(value, list) else value for key, value in self.details.items()}}
-        said = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
-        width = max(map(len, said))
-        out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in said.items()]
+        shown = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
+        width = max(map(len, shown))
+        out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in shown.items()]
         return "\n".join(out + ([f"  problem: {_line(p)}" for p in self.problems] or ["  no problems"]))
 
 
@@ -305,11 +305,11 @@ def _describe_logging(session: Session) -> dict[str, str]:
     from workbench.compare.session_takes import read_takes
 
     try:
-        told = how_logged(read_takes(session)[0])
+        logging = how_logged(read_takes(session)[0])
     except InputError:
         return {}
-    notes = {f"logged: {name}": "; ".join(lines) for name, lines in told.get("logs", {}).items()}
-    return notes | {f"register of {joint}": law for joint, law in told.get("duty_registers", {}).items()}
+    notes = {f"logged: {name}": "; ".join(lines) for name, lines in logging.get("logs", {}).items()}
+    return notes | {f"register of {joint}": law for joint, law in logging.get("duty_registers", {}).items()}
 
 
 def _fitted_model(path: Path) -> Inspection:

@@ -180,8 +180,8 @@ class RobotModel:
     def sha256(self) -> str:
         """Hash of the description's content and of everything said about it."""
         digest = hashlib.sha256(self.source.source.read_bytes())
-        said = self.as_dict() | {"description": self.source.source.name}
-        digest.update(yaml.dump(said, Dumper=FAST_YAML, sort_keys=True).encode())
+        content = self.as_dict() | {"description": self.source.source.name}
+        digest.update(yaml.dump(content, Dumper=FAST_YAML, sort_keys=True).encode())
         return digest.hexdigest()
 
     def as_dict(self) -> dict[str, Any]:

@@ -241,10 +241,10 @@ def _marker(f: Fields, registers: Mapping[str, Register]) -> str | None:
 
 
 def _group_read(f: Fields) -> Literal["", "sync", "feetech", "bulk"]:
-    said = f.text("group_read") or ""
-    if said not in ("", "sync", "feetech", "bulk"):
-        raise f.error("group_read", f"expected sync, feetech or bulk, got {said!r}")
-    return said  # type: ignore[return-value]  # one of them
+    kind = f.text("group_read") or ""
+    if kind not in ("", "sync", "feetech", "bulk"):
+        raise f.error("group_read", f"expected sync, feetech or bulk, got {kind!r}")
+    return kind  # type: ignore[return-value]  # one of them
 
 
 def _register_name(f: Fields, registers: Mapping[str, Register]) -> str:

@@ -143,11 +143,11 @@ def _firmware_section(motion: Motion, folder: Path, violations: tuple[Violation,
     table = motion.as_table()
     rows = [[str(k + 1), str(table.dwells_ms[k]), *map(str, goals)] for k, goals in enumerate(table.goals)]
     names = ", ".join(f"`{path.name}`" for path in sorted(folder.iterdir()))
-    said = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
+    result = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
     return Section("Onto the robot", [
         Text(f"{names} in `firmware/`, checked against each servo's range, speed and, as it ran in simulation, torque."),
         Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, table.families)) + "."),
-        Details("Result of the check", [Text(said)])])
+        Details("Result of the check", [Text(result)])])
 
 
 def _as_text(rows: list[Row]) -> str:

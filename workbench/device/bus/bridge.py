@@ -49,11 +49,11 @@ def _answer(port: Any) -> tuple[AnswerMessage | None, StateMessage | None]:
     deadline = port.getCurrentTime() + WAIT
     while port.getCurrentTime() < deadline:
         for got in reader.feed(bytes(port.readPort(256))):
-            said = message(got)
-            if isinstance(said, StateMessage):
-                state = said
-            if isinstance(said, AnswerMessage) and said.type == FrameType.BRIDGE:
-                return said, state
+            answer = message(got)
+            if isinstance(answer, StateMessage):
+                state = answer
+            if isinstance(answer, AnswerMessage) and answer.type == FrameType.BRIDGE:
+                return answer, state
     return None, state
 
 

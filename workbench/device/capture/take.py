@@ -37,9 +37,9 @@ def record_take(recorder: Recorder, take: Path, until: Callable[[], bool], secon
                     recorder.stop_recording()
     finally:
         recorder.link.close()
-    said = None if not motive_too else refusal or f"recorded as '{take.stem}'"
+    motive_state = None if not motive_too else refusal or f"recorded as '{take.stem}'"
     ended = recorder.problem or (f"Motive itself did not record: {refusal}" if refusal else "")
-    capture = finish(journal.path, take, ended, said, until_time())
+    capture = finish(journal.path, take, ended, motive_state, until_time())
     journal.path.unlink()
     return capture
 

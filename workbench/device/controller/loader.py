@@ -67,8 +67,8 @@ class Transcript:
 
     def note(self, who: str, what: bytes | str) -> None:
         """Bytes as Python writes them, at most the first 200."""
-        said = what if isinstance(what, str) else repr(what[:200])[1:] + (f" … {len(what)} bytes" if len(what) > 200 else "")
-        self.lines.append(f"{self.now() - self._began:9.3f} {who}: {said}")
+        text = what if isinstance(what, str) else repr(what[:200])[1:] + (f" … {len(what)} bytes" if len(what) > 200 else "")
+        self.lines.append(f"{self.now() - self._began:9.3f} {who}: {text}")
 
     @property
     def text(self) -> str:
@@ -135,8 +135,8 @@ class Loading:
 
     def _at_prompt(self, heard: bytes) -> bool:
         """Its last line is a prompt and nothing else; echoes of our key may be mixed in."""
-        said = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
-        return said in self._profile.prompt
+        last_line = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
+        return last_line in self._profile.prompt
 
     def _load(self) -> None:
         """LOAD, once more where it was refused: the line may have garbled it. Refused, it erases nothing."""
@@ -187,8 +187,8 @@ class Loading:
         self._progress("4 of 4: starting it", None)
         self._until_quiet()
         self._write(profile.keep + profile.line_end)
-        said = self._until_prompt(PROMPT_AGAIN)
-        if any(text in said for text in profile.refused):
+        answer = self._until_prompt(PROMPT_AGAIN)
+        if any(text in answer for text in profile.refused):
             self._transcript.note("we note", f"{profile.keep.decode()} is unknown to it: it may wait for commands after a reset")
         self._fresh_prompt()
         self._write(profile.start + profile.line_end)
@@ -205,9 +205,9 @@ class Loading:
             if ask:
                 self._write(ask)
             for got in reader.feed(self._read(0.1)):
-                said = message(got)
-                if isinstance(said, StateMessage):
-                    return said
+                content = message(got)
+                if isinstance(content, StateMessage):
+                    return content
             waited += 0.1
         return None
 

@@ -153,8 +153,8 @@ class Controller:
         while True:
             left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
             if left is not None:
-                said = left if isinstance(left, StateMessage) else self.state()
-                return began, "" if said.reason == ENDED else _reason(said)
+                final = left if isinstance(left, StateMessage) else self.state()
+                return began, "" if final.reason == ENDED else _reason(final)
             if self.now() >= end + SPARE:
                 return began, f"it still plays {SPARE:g} s after its end"
             if self.now() - self.heard[-1][0] > SILENT:
@@ -181,8 +181,8 @@ class Controller:
 
     def began(self) -> float | None:
         """When it last began to play [s of its own clock], None where it never did."""
-        told = [m for _, m in self.heard if isinstance(m, StateMessage) and m.state == ControllerState.PLAY]
-        return told[-1].time if told else None
+        playing = [m for _, m in self.heard if isinstance(m, StateMessage) and m.state == ControllerState.PLAY]
+        return playing[-1].time if playing else None
 
     def clock_offset(self) -> float:
         """The computer's clock less the controller's [s]: the soonest arrival of a round, less what its bytes take."""
@@ -211,10 +211,10 @@ class Controller:
                 self._port.pause(0.001)
             hit = None
             for got in self._reader.feed(data):
-                said = message(got)
-                if said is not None:
-                    self.heard.append((self.now(), said))
-                    hit = hit or (said if wanted(said) else None)
+                content = message(got)
+                if content is not None:
+                    self.heard.append((self.now(), content))
+                    hit = hit or (content if wanted(content) else None)
             if hit is not None:
                 return hit
         return None
@@ -276,16 +276,16 @@ def _let_go(controller: Controller) -> bool:
         return False
 
 
-def _left_play(said: Message) -> bool:
-    return isinstance(said, StateMessage | LogMessage) and said.state != ControllerState.PLAY
+def _left_play(m: Message) -> bool:
+    return isinstance(m, StateMessage | LogMessage) and m.state != ControllerState.PLAY
 
 
-def _on_the_way(said: Message) -> bool:
-    return isinstance(said, StateMessage) and said.state in (ControllerState.PLAY, ControllerState.RAMP)
+def _on_the_way(m: Message) -> bool:
+    return isinstance(m, StateMessage) and m.state in (ControllerState.PLAY, ControllerState.RAMP)
 
 
-def _plays_or_gave_up(said: Message) -> bool:
-    return isinstance(said, StateMessage) and said.state != ControllerState.RAMP
+def _plays_or_gave_up(m: Message) -> bool:
+    return isinstance(m, StateMessage) and m.state != ControllerState.RAMP
 
 
 def _reason(state: StateMessage) -> str:

@@ -76,10 +76,10 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     for joint in content.joints:
         rows = readings[joint]
         channels[f"position.{joint}"] = _position(time, rows[:, 0], rows[:, 1], moved)
-        told = rows[np.isfinite(rows[:, 2])]
-        channels[f"temperature.{joint}"] = _slow(time, told[:, 0], told[:, 3])
+        measured = rows[np.isfinite(rows[:, 2])]
+        channels[f"temperature.{joint}"] = _slow(time, measured[:, 0], measured[:, 3])
         channels[f"enabled.{joint}"] = _enabled(time, joint, content)
-        volts.append(_slow(time, told[:, 0], told[:, 2]))
+        volts.append(_slow(time, measured[:, 0], measured[:, 2]))
     known = np.isfinite(volts).any(axis=0)
     channels["voltage"] = np.where(known, np.nansum(volts, axis=0) / np.maximum(np.isfinite(volts).sum(axis=0), 1), np.nan)
     return write_joint_log(log, time - start, channels)

@@ -196,9 +196,9 @@ class ServoBus:
             return
         there = [servo for servo in self.servos
                  if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key]
-        said = [(end, data) for servo in there if (told := servo.add_block(what, time, head, so_far)) for end, data in [told]]
-        if said:
-            end, data = max(said)
+        blocks = [(end, data) for servo in there if (block := servo.add_block(what, time, head, so_far)) for end, data in [block]]
+        if blocks:
+            end, data = max(blocks)
             self.clock.at(end, partial(self._one_packet, what, ids[1:], key, end, head, so_far + data))
 
     def _collide(self, one: Burst, two: Burst) -> None:

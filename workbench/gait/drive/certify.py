@@ -175,8 +175,8 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
         step = content["step_map"]
         numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
         step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
-        told: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
-        found = FamilyCertificate(**told, step_map=step_map, problems=tuple(content["problems"]))
+        content_fields: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
+        found = FamilyCertificate(**content_fields, step_map=step_map, problems=tuple(content["problems"]))
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
     if found.model_sha256 != model.sha256:

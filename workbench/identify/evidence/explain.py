@@ -54,11 +54,12 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     rollouts, found, rejected = robot.rollouts, robot.found, [*by_registers, *rejected]
     tried = checks(felt, evidence, options, progress)
     for _ in range(NUMERICS.rounds):
-        said = refuted(tried, rollouts, found)
-        if not said:
+        objections = refuted(tried, rollouts, found)
+        if not objections:
             break
-        rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
-        left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
+        rejected += [Rejected(c.name, c.where, why) for gone in objections for c, why in gone.items()]
+        fits = {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, objections)) if gone}
+        left = lockstep(rollouts, fits)
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = continue_search(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)

@@ -68,9 +68,9 @@ class Explanation:
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """Gravity over torque where it is not as told, with the effects that could be it."""
         weighed = len({repr(e.take.spec.load) for e in self.looked_at}) > 1
-        said = (gravity_over_torque(region, self.options, p, fits, weighed)
+        ties = (gravity_over_torque(region, self.options, p, fits, weighed)
                 for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.of_tie))
-        return tuple(s for s in said if s is not None)
+        return tuple(s for s in ties if s is not None)
 
     @property
     def model(self) -> RobotModel:
@@ -213,14 +213,14 @@ class Explanation:
         """Effects that were fitted and are not in the likeliest model, with the nats by which the best model with them is
         behind."""
         out = list(self.refuted)
-        said = {(r.effect, r.where) for r in out}
+        listed = {(r.effect, r.where) for r in out}
         for p, found in zip(self.posteriors, self.found):
             kept = {(c.name, c.where) for c in p.best.hypothesis.effects}
             for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior):
                 for c in f.hypothesis.effects:
-                    if (c.name, c.where) in kept | said:
+                    if (c.name, c.where) in kept | listed:
                         continue
-                    said.add((c.name, c.where))
+                    listed.add((c.name, c.where))
                     behind = p.best.log_posterior - f.log_posterior
                     out.append(Rejected(c.name, c.where, LessLikely(behind)))
         return tuple(out)

@@ -48,8 +48,8 @@ class Fitted:
         h, likelihood = self.hypothesis, region.likelihood
         H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
         if self.too_much is not None:
-            told, axes = np.linalg.eigh(H - self.too_much)
-            H = (axes * np.maximum(told, 0.0)) @ axes.T
+            eigenvalues, axes = np.linalg.eigh(H - self.too_much)
+            H = (axes * np.maximum(eigenvalues, 0.0)) @ axes.T
         H = H + np.diag(Prior.of(h, options).precision(h.theta))
         if self.beside is not None and h.law is not None:  # what the weights could take over is not known
             W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.beside
@@ -79,8 +79,8 @@ def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> A
 def _at_least(H: Array, prior: Array) -> Array:
     """Information (k, k) that is nowhere less than the prior's (k,)."""
     scale = np.sqrt(prior)
-    told, axes = np.linalg.eigh(H / np.outer(scale, scale))
-    return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(told, 1.0)) @ axes.T))
+    eigenvalues, axes = np.linalg.eigh(H / np.outer(scale, scale))
+    return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(eigenvalues, 1.0)) @ axes.T))
 
 
 def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:

@@ -39,7 +39,7 @@ def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequen
     """The effects of a fit that held-out takes contradict, with the evidence against each [nats]: log likelihood of the held-out
     takes, of the fit with the effect and without, each fitted to the other takes; summed over the folds that can decide."""
     effects = best.hypothesis.effects
-    said = dict.fromkeys(range(len(effects)), 0.0)
+    gains = dict.fromkeys(range(len(effects)), 0.0)
     for fold in folds:
         seen = region.of_takes([i for i in {p.take for p in region.parts} if i not in fold])
         unseen = region.of_takes(fold)
@@ -51,8 +51,8 @@ def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequen
         left = yield [f.hypothesis for f in fits]
         logs = [unseen.likelihood.log(r[region.of(fold)], f.discrepancy) for f, r in zip(fits, left)]
         for k, log in zip(telling, logs[1:]):
-            said[k] += logs[0] - log
-    return {effects[k]: gain for k, gain in said.items() if gain < -options.veto}
+            gains[k] += logs[0] - log
+    return {effects[k]: gain for k, gain in gains.items() if gain < -options.veto}
 
 
 def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: float, J: Array) -> Asks[Fitted]:
@@ -71,6 +71,6 @@ def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: 
 def _excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:
     """Whether the takes that are seen tell enough of an effect."""
     own = best.hypothesis.slices()[k]
-    told = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
-    return bool(told[region.of([p.take for p in seen.parts])].sum() >= EXCITED * told.sum())
+    information = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
+    return bool(information[region.of([p.take for p in seen.parts])].sum() >= EXCITED * information.sum())
 

@@ -59,10 +59,10 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
         return None
     at = slice(int(np.argmax(power)), int(np.argmax(power)) + n)
     time, q = e.take.recorded.time, e.recorded[:, k]
-    speed, said = np.gradient(q, time), np.gradient(q - r, time)
+    speed, modelled = np.gradient(q, time), np.gradient(q - r, time)
     register = e.take.recording.channels.get(f"duty.{joint}")
     duty = np.full(len(time), np.nan) if register is None else np.interp(time, e.take.recording.time, register)
-    middle = [_middle(x[at]) for x in (q, np.abs(speed), np.abs(said), duty)]
+    middle = [_middle(x[at]) for x in (q, np.abs(speed), np.abs(modelled), duty)]
     return _Event(float(time[at][0]), float(np.sqrt(np.mean(np.square(np.nan_to_num(r[at]))))), *middle)
 
 

@@ -139,8 +139,8 @@ def widened(covariance: Array, by: float) -> Array:
     """A covariance (k, k) of numbers whose variance was 1 before any data, with the data's information as if errors were `by`
     times as large. Directions of which the data hold no information keep their variance."""
     variances, axes = np.linalg.eigh(covariance)
-    told = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
-    return np.asarray((axes / (1.0 + told / by**2)) @ axes.T)
+    information = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
+    return np.asarray((axes / (1.0 + information / by**2)) @ axes.T)
 
 
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:

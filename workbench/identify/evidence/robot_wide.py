@@ -179,9 +179,9 @@ class Whole:
 
     def _objective(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> float:
         """Log likelihood and prior [nats] at the discrepancies of `at`."""
-        told = (region.likelihood.log(r, f.discrepancy) + Prior.of(h, self.options).log(h.theta)
-                for region, f, h, r in zip(self.regions, at.fits, each, left))
-        return sum(told) + Prior.of(shared, self.options).log(shared.theta)
+        parts = (region.likelihood.log(r, f.discrepancy) + Prior.of(h, self.options).log(h.theta)
+                 for region, f, h, r in zip(self.regions, at.fits, each, left))
+        return sum(parts) + Prior.of(shared, self.options).log(shared.theta)
 
 
 def _within(h: Hypothesis, by: Array) -> Hypothesis:

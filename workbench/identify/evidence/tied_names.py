@@ -82,45 +82,46 @@ def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Tie
     named = any(competes(c) for c in f.hypothesis.effects)
     if ratio is None or not members or not (named or ratio.is_apart(options)):
         return None
-    told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
+    published = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
     rest = [(c, x) for c, x in f.hypothesis.sizes() if not competes(c)]
     torque = f
     if len(rest) < len(f.hypothesis.effects):
         alone = Hypothesis(region.numbers, tuple(c for c, _ in rest), np.concatenate([f.hypothesis.z, *(x for _, x in rest)]))
         torque = yield from fitting(region, options, alone, f.discrepancy, options.iterations)
         torque = yield from polished(region, options, torque)
-    without = Hypothesis(told.numbers, tuple(c for c, _ in rest), np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)]))
-    fits = yield from _each_alone(told, options, without, f)
+    sizes = np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)])
+    without = Hypothesis(published.numbers, tuple(c for c, _ in rest), sizes)
+    fits = yield from _each_alone(published, options, without, f)
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
     return TieFits(torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
 
 
-def _each_alone(told: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
+def _each_alone(published: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
     """The likeliest fit of each candidate in addition to a hypothesis, from three starts: the law fitted without it, which is
     distorted for want of it (a zero goes as far as it may where gravity leans); the law as it stands; and that of the fit f,
     which is not distorted where it has another of the candidates."""
-    bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
-    moves = list((yield from linearised(told, options, bare)))
-    as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, told.numbers)]
+    bare = yield from fitting(published, options, without, f.discrepancy, options.iterations)
+    moves = list((yield from linearised(published, options, bare)))
+    as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, published.numbers)]
     for z in (without.z, np.clip(as_fitted, -FAR, FAR)):
-        moves += (yield from linearised_around(told, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
-    fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
-    fits = yield from side_by_side([polished(told, options, g) for g in fits])
+        moves += (yield from linearised_around(published, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
+    fits = yield from side_by_side([fitting(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    fits = yield from side_by_side([polished(published, options, g) for g in fits])
     return list(with_better({}, fits).values())
 
 
-def shared_by_tie(f: Finding, told: GravityOverTorque | None) -> Finding:
+def shared_by_tie(f: Finding, tie: GravityOverTorque | None) -> Finding:
     """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with its share
     of the tie's probability, which is divided equally among all of these."""
-    if told is None:
+    if tie is None:
         return f
-    near = told.competitive
+    near = tie.competitive
     others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
     if not others or len(others) == len(near):
         return f
-    each = min(f.confidence, told.confidence / len(near))
+    each = min(f.confidence, tie.confidence / len(near))
     rival = Alternative(others[0].effect, others[0].where, each)
-    return replace(f, confidence=each, of_tie=told.confidence, alternatives=(rival,))
+    return replace(f, confidence=each, of_tie=tie.confidence, alternatives=(rival,))
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:

@@ -65,11 +65,11 @@ class ModelKeys:
         """Of the description's content and of everything said about it."""
         if self._last is not None and self._last[0] is model:  # on another take
             return self._last[1]
-        told = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
-        source = f"{model.description} {told}"
+        settings = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
+        source = f"{model.description} {settings}"
         if source not in self._files:
             content = model.source.source.read_bytes()
-            self._files[source] = hashlib.sha256(content + b" " + told.encode()).hexdigest()
+            self._files[source] = hashlib.sha256(content + b" " + settings.encode()).hexdigest()
         physics = repr((sorted(model.servos.items()), model.effects))
         key = hashlib.sha256(f"{self._files[source]} {physics}".encode()).hexdigest()
         self._last = (model, key)

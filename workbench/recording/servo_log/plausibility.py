@@ -71,8 +71,8 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         if joint in exchanged:
             channels[name] = np.full(len(time), np.nan)
         elif name in channels and not (goal is not None and _in_another_unit(goal)):
-            channels[name], said = without_leaps(time, channels[name])
-            problems += [name_problem(name, text) for text in said]
+            channels[name], texts = without_leaps(time, channels[name])
+            problems += [name_problem(name, text) for text in texts]
     read = replace(recording, channels=channels)
     for check in (_clock, _no_command):
         problems += check(read, checks)

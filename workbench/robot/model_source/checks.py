@@ -134,12 +134,12 @@ def _fixed_together(plant: Any) -> dict[str, set[str]]:
 
 def _without_mass(plant: Any, groups: dict[str, set[str]]) -> Iterator[str]:
     floating = {plant.get_body(b).name() for b in plant.GetFloatingBaseBodies()}
-    told: set[str] = set()
+    reported: set[str] = set()
     for name, group in groups.items():
         mass = sum(plant.GetBodyByName(n).default_mass() for n in group)
-        if mass > 0 or told & group:
+        if mass > 0 or reported & group:
             continue
-        told |= group
+        reported |= group
         if floating & group:
             yield f"link '{name}': the base floats and weighs nothing (with all that is fixed to it)"
         else:
