@@ -15,7 +15,7 @@ from workbench.dynamics.machine import DEFAULT_FRICTION, Machine
 from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, torque_margin
 from workbench.dynamics.result import InverseDynamicsResult
 from workbench.dynamics.stance import dearness, floor_under
-from workbench.dynamics.trajectory import RobotTrajectory, smoothed
+from workbench.dynamics.trajectory import RobotTrajectory, smooth
 from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
@@ -119,7 +119,7 @@ class InverseDynamics:
         p, quat = self._base_path(take)
         if take.zeroed and take.base != "fixed" and rest_rotation is not None:
             quat = quaternions.multiply(quat, rest_rotation)
-        trajectory, noise = smoothed(take.time, self.model.joints, q, p, quat, window)
+        trajectory, noise = smooth(take.time, self.model.joints, q, p, quat, window)
         self._note_gaps(take, trajectory, problems)
         dear = self._dearness(trajectory, stance, floor)
         solution = self._solve(trajectory, dear)
@@ -134,7 +134,7 @@ class InverseDynamics:
         for _ in range(draws):
             turned = _rotate(quat, _normal(random, np.full(p.shape, noise.rotation)))
             moved = p + _normal(random, np.tile(noise.p, (len(take), 1)))
-            noisy = smoothed(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
+            noisy = smooth(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
             other = self._solve(noisy, dear)
             torque += (other.torque - solution.torque) ** 2 / draws
             residual += (other.residual - solution.residual) ** 2 / draws

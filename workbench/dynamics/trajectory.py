@@ -60,8 +60,8 @@ class Noise:
     rotation: float
 
 
-def smoothed(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB: Array, window: float,
-             ) -> tuple[RobotTrajectory, Noise]:
+def smooth(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB: Array, window: float,
+           ) -> tuple[RobotTrajectory, Noise]:
     """From samples of q (N, n), p_WB (N, 3) and quat_WB (N, 4) at times (N,), each smoothed and differentiated over `window`
     [s] by `differentiate`, and the noise that their scatter shows."""
     quat, _ = quaternions.continuous(quat_WB)

@@ -130,7 +130,7 @@ class Drawn:
     incident: str = ""
 
 
-def drawn(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
+def record_draw(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
     """Of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake played it."""
     incident = ""
     if measure.fell:
@@ -139,10 +139,10 @@ def drawn(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: b
         went = f"{float(np.hypot(*measure.velocity)):.2f} m/s, tilt {math.degrees(measure.tilt):.0f} deg"
         incident = f"something other than a foot touched; it went on at {went}"
     kept = replace(measure, clearance=feet.clearance, slip=feet.slip, touched=gave_up and not measure.fell)
-    return Drawn(described(model), kept, feet, incident)
+    return Drawn(describe_robot(model), kept, feet, incident)
 
 
-def described(model: RobotModel) -> str:
+def describe_robot(model: RobotModel) -> str:
     """What stands out of a drawn robot: its floor and its supply."""
     words = {"ground_friction": ("friction", "friction {:.2f}"), "supply_voltage": ("voltage", "{:.1f} V"),
              "supply_sag": ("drop", "{:.2f} V sag a servo")}

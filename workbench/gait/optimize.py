@@ -25,9 +25,9 @@ from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.plan_compare import PlanComparison, compare_plan
-from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
+from workbench.gait.plan_method import Plans, choose_plan, plan_entry, plans_of
 from workbench.gait.planned import planned_seeds
-from workbench.gait.refine import RefineOptions, refined
+from workbench.gait.refine import RefineOptions, refine
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -112,12 +112,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = _Draws(ensemble, machine.model, options, Path(folder))
         began = time.monotonic()
-        evaluator = Evaluator(machine, sought(request), draws.searched(), memory, options.n_jobs)
+        evaluator = Evaluator(machine, sought(request), draws.searching(), memory, options.n_jobs)
         plans = Plans() if options.method == "search" else plans_of(evaluator, progress)
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
-        before, found = found, refined(evaluator, found, options.refine, progress)
+        before, found = found, refine(evaluator, found, options.refine, progress)
         plans = plans.with_refined(before, found)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
@@ -127,10 +127,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
-            origin = {**provenance, "finalist": finalist, **told_of_plan(c, plans)}
+            origin = {**provenance, "finalist": finalist, **plan_entry(c, plans)}
             return table, certify(machine, request, table, draws.certifying(), examined, progress, origin, other)
 
-        def finished(met: bool, problem: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
+        def finish(met: bool, problem: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
             planned = plans.of(table.shape)
             comparison = (None if planned is None else
                           compare_plan(machine, planned, table, certified.take, certified.cycles))
@@ -147,25 +147,25 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
                 continue
             certified.append(examine(walked, options.certify, k + 1))
             if certified[-1][1].certificate.kept:
-                return finished(True, "", *certified[-1], replace(found, best=walked))
+                return finish(True, "", *certified[-1], replace(found, best=walked))
             progress(f"finalist {k + 1} is not certified: {binding(certified[-1][1].certificate.margins)}", None)
             if len(certified) == options.screening.certified:
                 break
         if certified:
             table, best = min(certified, key=lambda c: violation(c[1].certificate.margins))
-            return finished(False, _unmet(request, best.certificate.margins, None), table, best, found)
+            return finish(False, _unmet(request, best.certificate.margins, None), table, best, found)
         binds = min(refused, key=Candidate.rank, default=found.best)
         nearest = _nearest(found, refused)
         problem = _unmet(request, binds.margins, nearest)
         if nearest is None:
             return Optimized(request, False, problem, None, None, found)
-        return finished(False, problem, *examine(nearest, _briefly(options.certify), 0), found)
+        return finish(False, problem, *examine(nearest, _briefly(options.certify), 0), found)
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
     """Result of a method; None where no plan led to a table."""
     if options.method == "plan":
-        return chosen(evaluator, plans, progress)
+        return choose_plan(evaluator, plans, progress)
     if options.planned:
         progress("planning seeds", 0.0)
     planned = planned_seeds(evaluator.machine, evaluator.request) if options.planned else ()
@@ -181,7 +181,7 @@ class _Draws:
     options: OptimizeOptions
     folder: Path
 
-    def searched(self) -> list[RobotModel]:
+    def searching(self) -> list[RobotModel]:
         """Those of the search, floor and supply spread evenly."""
         return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder, even=True)
 

@@ -69,7 +69,7 @@ class RefineOptions:
         check_positive(self, "probe", "target", "speed", "heading", "limit", "headroom")
 
 
-def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
+def refine(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
     """The search's result with its best gait refined, by the whole change or a part of it, where that is better on all of the
     evaluator's robots. Gaits that are better come first, the gait before them next. Only gaits that go straight and aim at speed
     are refined: their mirror symmetry halves the unknowns."""
@@ -80,7 +80,7 @@ def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress
     if shape == best.shape:
         return found
     progress("the refined gait on the ensemble", None)
-    tried = evaluator.judged([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
+    tried = evaluator.judge([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
     better = sorted((c for c in tried if c.nominal is not None and c.rank() < best.rank()), key=Candidate.rank)
     first, *others = [*better[:KEPT], best]
     return replace(found, best=first, others=(*others, *found.others), rollouts=evaluator.rollouts)
@@ -133,7 +133,7 @@ class Goal:
     def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> Goal:
         """At a shape, from its runs on all of the evaluator's robots."""
         request, few = evaluator.request, options.robots
-        nominal, *draws = evaluator.measured([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
+        nominal, *draws = evaluator.measure([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
         order = sorted(range(len(draws)), key=lambda k: request.progress(draws[k]))
         order = [k for k in order if not draws[k].fell] + [k for k in order if draws[k].fell]
         uses = [_largest(_uses(evaluator, draws[k], False)) for k in order if not draws[k].fell]
@@ -147,7 +147,7 @@ class Goal:
 
     def residuals(self, shapes: Sequence[GaitShape]) -> list[Array]:
         """Of each shape (R,)."""
-        measures = self.evaluator.measured([(s, robot) for s in shapes for robot in self.robots])
+        measures = self.evaluator.measure([(s, robot) for s in shapes for robot in self.robots])
         n = len(self.robots)
         return [np.concatenate([self._of(m, nominal=i == 0) for i, m in enumerate(measures[k:k + n])])
                 for k in range(0, len(measures), n)]

@@ -88,7 +88,7 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
     shapes = [*given, *(seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed) if budget.seeds else ())]
     if not shapes:
         raise InputError(None, "seeds: expected 1 or more, or a gait to start from, got 0")
-    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seeded(shapes))]
+    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seed_points(shapes))]
     for k in range(budget.generations):
         together = k < IN_TURN * len(runs)
         refiner = runs[k % len(runs)] if together else min(runs, key=lambda r: r.best.rank())
@@ -111,13 +111,13 @@ class _Run:
         self._streak = 0
         self._seen: list[Candidate] = []
 
-    def seeded(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
+    def seed_points(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
         """Starting points: the best on the ensemble of the best seeds, each of another family or another way of the
         knees."""
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
             self.progress(f"seeds {k} of {len(shapes)}", 0.0)
-            judged += steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
+            judged += steer(self.evaluator, self.space, self.evaluator.judge(shapes[k:k + 40], 0))
         screened: list[Candidate] = []
         kinds = Counter[tuple[str, tuple[int, int]]]()
         for c in sorted(judged, key=Candidate.rank):
@@ -125,7 +125,7 @@ class _Run:
             if kinds[_kind(c)] <= ALIKE and len(screened) < self.budget.screened:
                 screened.append(c)
         self.progress(f"{len(screened)} gaits on {self.draws} robots of the ensemble", None)
-        tried = self.tried(screened)
+        tried = self.try_on_draws(screened)
         self._note(tried)
         out: list[Candidate] = []
         for c in sorted(tried, key=Candidate.rank):
@@ -133,9 +133,9 @@ class _Run:
                 out.append(c)
         return out[:self.budget.starts]
 
-    def tried(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+    def try_on_draws(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Each on the robots of the ensemble, those apart that do not even walk on the nominal one."""
-        return self.evaluator.judged([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
+        return self.evaluator.judge([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
 
     def note_generation(self, candidates: Sequence[Candidate]) -> None:
         """After a generation: keeps the best, reports it."""
@@ -228,11 +228,11 @@ class _Refiner:
         """One generation on the nominal robot, and its better part on the ensemble."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
-        judged = run.evaluator.judged([self._shape(x) for x in points], 0)
-        judged = steered(run.evaluator, run.space, judged)
+        judged = run.evaluator.judge([self._shape(x) for x in points], 0)
+        judged = steer(run.evaluator, run.space, judged)
         better = sorted(range(len(judged)), key=lambda k: judged[k].merit)[:math.ceil(TRIED * len(judged))]
         better = [k for k in better if judged[k].nominal is not None]
-        for k, c in zip(better, run.tried([judged[k] for k in better])):
+        for k, c in zip(better, run.try_on_draws([judged[k] for k in better])):
             judged[k] = c
         order = sorted(range(len(judged)), key=lambda k: (k not in better, judged[k].merit))
         cost = np.empty(len(judged))
@@ -248,7 +248,7 @@ class _Refiner:
         self.best = min(self.best, *(judged[k] for k in better), key=Candidate.rank) if better else self.best
 
 
-def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
+def steer(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
     """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
     need not be searched for. First by as much as it turns, then by the secant of two runs, `times` in all."""
     request, out = evaluator.request, list(candidates)
@@ -263,7 +263,7 @@ def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate], tim
             if c.nominal is not None and not c.nominal.fell and any(m.kind == "straying" and m.use > 1 for m in c.margins):
                 tried[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
         before = last
-        last = dict(zip(tried, evaluator.judged(list(tried.values()), 0)))
+        last = dict(zip(tried, evaluator.judge(list(tried.values()), 0)))
         for k, c in last.items():
             out[k] = min(out[k], c, key=Candidate.rank)
     return out

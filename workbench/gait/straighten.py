@@ -67,12 +67,12 @@ def turn_response(machine: GaitMachine, request: Request, shape: GaitShape, robo
         raise InputError(None, "a turn in place has no heading to straighten; expected a gait that goes somewhere")
     evaluator = Evaluator(machine, request, (), n_jobs=1, config=SEARCH)
     turned = [replace(shape, turn=shape.turn + change) for change in (-PROBE, PROBE)]
-    right, left = evaluator.measured([(s, evaluator.nominal) for s in turned])
+    right, left = evaluator.measure([(s, evaluator.nominal) for s in turned])
     rate = (excess_turning(request, left) - excess_turning(request, right)) / (2 * PROBE)
     if right.fell or left.fell or rate <= 0:
         raise InputError(None, f"the gait does not answer to its turn ({rate:.2g} 1/s); expected one that can be steered")
     speed = (request.progress(left) + request.progress(right)) / 2
-    others = evaluator.measured([(s, robot) for robot in robots for s in turned])
+    others = evaluator.measure([(s, robot) for robot in robots for s in turned])
     pairs = [(a, b) for a, b in zip(others[::2], others[1::2]) if not (a.fell or b.fell)]
     shares = [(excess_turning(request, b) - excess_turning(request, a)) / (2 * PROBE * rate) for a, b in pairs]
     if len(shares) < FEWEST_ROBOTS or not 0.2 < float(np.mean(shares)) < 5.0:
@@ -124,7 +124,7 @@ class Straightener:
         estimate: TurnEstimate | None = None
         shape, out = self.shape, list[float]()
         for metre in range(METRES + 1):
-            (m,) = evaluator.measured([(shape, robot)])
+            (m,) = evaluator.measure([(shape, robot)])
             if m.fell:
                 break
             if estimate is None:

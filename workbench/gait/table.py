@@ -106,7 +106,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool
              pose_table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
     stop = [pose_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
             pose_table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
-    return GaitTable(shape, cycle, joined(start, source), joined(stop, source), paths.off, q)
+    return GaitTable(shape, cycle, join_tables(start, source), join_tables(stop, source), paths.off, q)
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
@@ -133,7 +133,7 @@ def pose_table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArra
     return PoseTable(machine.model.joints, counts, speeds, dwells, source, units)
 
 
-def joined(parts: list[PoseTable], source: str) -> PoseTable:
+def join_tables(parts: list[PoseTable], source: str) -> PoseTable:
     """One table without sections: the poses of one part after the other, all of the same joints."""
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))

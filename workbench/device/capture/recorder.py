@@ -132,7 +132,7 @@ class Recorder:
             self._stay_in_touch(now)
             self._check_silence(now - began, now - self._last_frame)
             if progress is not None:
-                progress(self._said(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
+                progress(self._describe_stage(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
         quiet = self.link.now() - self._last_frame
         if self.counts_received and not self.problem and quiet > self.options.trailing:
             self.problem = f"no frame came in the last {quiet:.1f} s of the recording"
@@ -145,7 +145,7 @@ class Recorder:
         for data in (packet(Message.NOTE, json.dumps(note).encode()), *self._descriptions):
             journal.packet(now, data)
 
-    def _said(self) -> str:
+    def _describe_stage(self) -> str:
         c = self.counts
         bodies = f"{self._tracked} of {len(self.names)} bodies"
         return f"recording, {c.received} frames, {c.lost} lost, {c.broken} broken, {bodies}"

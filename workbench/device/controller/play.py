@@ -151,7 +151,7 @@ class Controller:
         began = self.start()
         end = self.now() + seconds
         while True:
-            left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
+            left = self._wait(_has_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
             if left is not None:
                 final = left if isinstance(left, StateMessage) else self.state()
                 return began, "" if final.reason == ENDED else _reason(final)
@@ -276,7 +276,7 @@ def _let_go(controller: Controller) -> bool:
         return False
 
 
-def _left_play(m: Message) -> bool:
+def _has_left_play(m: Message) -> bool:
     return isinstance(m, StateMessage | LogMessage) and m.state != ControllerState.PLAY
 
 

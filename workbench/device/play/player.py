@@ -70,10 +70,10 @@ class _Performance:
                 self._rest()
                 self._poses(commands)
                 self._ramp(neutral, "back to neutral")
-                self._arrived(neutral)
+                self._wait_for_arrival(neutral)
                 self._rest()
             except StopError as e:
-                stopped, released = self._stopped(e.reaction, neutral), True
+                stopped, released = self._carry_out(e.reaction, neutral), True
             bus.options = kept
             if released and self._energised:
                 unknown = rig.release()
@@ -119,7 +119,7 @@ class _Performance:
     def _to_neutral(self, neutral: Mapping[str, float]) -> None:
         """The first way, with little torque; then with as much as the motion gets, so that the joints are where it begins."""
         self._ramp(neutral, "to neutral")
-        self._arrived(neutral)
+        self._wait_for_arrival(neutral)
         self.rig.limit_torque(self.options.torque)
         self._seat(neutral)
 
@@ -148,7 +148,7 @@ class _Performance:
             gone += min(bus.now() - last, 2 * options.step)  # a computer that stood still goes on where it was
             last = bus.now()
 
-    def _arrived(self, target: Mapping[str, float]) -> None:
+    def _wait_for_arrival(self, target: Mapping[str, float]) -> None:
         """Waits until every joint is near its goal; a joint that never is ends it: something holds it, or it has no strength."""
         bus, end = self.rig.bus, self.rig.bus.now() + self.options.within
         while True:
@@ -226,7 +226,7 @@ class _Performance:
             self._asked = asked
             raise StopError(Reaction(how, asked))
 
-    def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
+    def _carry_out(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
         """Carries out the reaction and returns its reason, with any that came on the way to neutral; there, only reactions that
         release, or a second signal, count."""
         rig = self.rig

@@ -103,7 +103,7 @@ class Answers:
         out += [f"joint {joint} turns the other way than in the model" for joint in self.reversed]
         return out
 
-    def corrected(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
+    def corrections(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
         """The keys `bus_ids` and `direction` of a `robot` section that agree with the observations; a key that is right already
         is left out. InputError where two servos were seen to move one joint."""
         seen = list(self.moved.values())

@@ -227,7 +227,7 @@ class VirtualLink:
     def receive(self, timeout: float) -> tuple[float, bytes] | None:
         """The next packet and when it came [s], None where none comes within `timeout` [s]."""
         end = self._now + timeout
-        self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
+        self._waiting += [(t + DELAY, data) for t, data in self._server.due(end - DELAY)]
         self._waiting.sort(key=lambda item: item[0])
         if not self._waiting or self._waiting[0][0] > end:
             self._now = end

@@ -20,7 +20,7 @@ from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM, NAME, plain, read_certificate
 from workbench.gait.draws import bound
 from workbench.gait.drive.family import GaitFamily, Steer
-from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_map, fitted, rows_of
+from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_increments, fit_step_map, rows_of
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -125,7 +125,7 @@ def certify_family(family: GaitFamily, gait_sha256: str, ensemble: Ensemble, fol
     seconds = family.start_seconds + o.cycles * family.period
     jobs = [Job(r, config, family.sequence(steers), seconds) for r in robots]
     takes = simulate_batch(jobs, progress=lambda done, of: progress(f"drawn robot {done} of {of}", done / of))
-    maps = [fitted(*rows_of(t, steers, family), o.most) for t in takes if not fell(t)]
+    maps = [fit_increments(*rows_of(t, steers, family), o.most) for t in takes if not fell(t)]
     falls = len(takes) - len(maps)
     draws = {"count": len(takes), "falls": falls, "falls at most": bound(falls, len(takes)), **_spread(maps, family.period)}
     problems = (*broken_limits(family, o), *_problems(nominal, maps, falls, o))

@@ -12,10 +12,10 @@ import numpy as np
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
-from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
-from workbench.identify.evidence.recalibration import what_changed
-from workbench.identify.evidence.step_errors import extrapolated
+from workbench.identify.evidence.leftover import list_leftover
+from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widen, with_known
+from workbench.identify.evidence.recalibration import list_changes
+from workbench.identify.evidence.step_errors import extrapolate
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
 from workbench.identify.options import CONCLUSIONS, PROBLEM
@@ -84,14 +84,14 @@ class Explanation:
         for region, p in zip(self.rollouts.regions, self.posteriors):
             numbers = p.best.hypothesis.numbers
             n, covariance = len(numbers), p.best.covariance(region, self.options)
-            model = with_known(model, numbers, widened(covariance[:n, :n], self.options.formal))
+            model = with_known(model, numbers, widen(covariance[:n, :n], self.options.formal))
         return model
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
         return tuple(r for p in self.posteriors
-                     for r in what_changed(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
+                     for r in list_changes(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The likeliest model's effects, the surest first."""
@@ -199,11 +199,11 @@ class Explanation:
         steps = (2 * PROBLEM.fine, PROBLEM.fine)
         longer, shorter = evaluator.residuals([RolloutRequest(self.model, everywhere, step) for step in steps])
         floors = {i: np.nan_to_num(rms((longer[i] - shorter[i])[evidence[i].moving])) for i in everywhere}
-        return {i: extrapolated(longer[i], shorter[i]) for i in everywhere}, floors
+        return {i: extrapolate(longer[i], shorter[i]) for i in everywhere}, floors
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, with their worst event, and parameters that drift within a take."""
-        return (*left_over(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
+        return (*list_leftover(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
         """All frames were searched: what got no name is no gap, unless it shows."""

@@ -83,7 +83,7 @@ def _at_least(H: Array, prior: Array) -> Array:
     return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(eigenvalues, 1.0)) @ axes.T))
 
 
-def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:
+def evaluate(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:
     """A hypothesis with its evidence, where it stands. beside (n, m): slopes by the weights of its unnamed torque."""
     prior = Prior.of(h, options)
     density, precision, slopes = prior.log(h.theta), prior.precision(h.theta), J
@@ -96,8 +96,8 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
     return Fitted(h, r, J, s, log, odds, beside=beside)
 
 
-def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
-            J: Array | None = None) -> Asks[Fitted]:
+def fit_hypothesis(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
+                   J: Array | None = None) -> Asks[Fitted]:
     """Fits a hypothesis from its current parameters, at a discrepancy s. r, J: residuals there and their derivatives by theta, if
     known; else they are requested."""
     prior, seen = Prior.of(start, options), dict[bytes, Array]()
@@ -125,15 +125,15 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
     there = start.at(solved.x)
     left = seen[there.theta.tobytes()]
     J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
-    return judged(region, options, there, left, J_there)
+    return evaluate(region, options, there, left, J_there)
 
 
-def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
+def polish(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
     """A fit continued at its own discrepancy, with new slopes."""
-    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
+    return (yield from fit_hypothesis(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
 
 
-def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
+def regress(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
     """A fit with slopes J by regression on simultaneous moves of all parameters, in both directions, as far as `options.spread`:
     signs of a Hadamard matrix, so that every move informs every parameter (R. Plackett and J. Burman, Biometrika 33, 1946).
 
@@ -176,7 +176,7 @@ def slopes(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:
     return np.column_stack([(moved - r) / by for moved, by in zip(left, steps)])
 
 
-def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
+def drop_effects(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
     """A fit's hypothesis without some effects, and its slopes without theirs."""
     keep = list(range(len(f.hypothesis.numbers)))
     for c, s in zip(f.hypothesis.effects, f.hypothesis.slices()):

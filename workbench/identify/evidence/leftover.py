@@ -34,7 +34,7 @@ class _Event(NamedTuple):
     duty: float
 
 
-def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+def list_leftover(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels beyond noise, numerics and spread, each with its worst event, the largest first. residuals, floors: over sigma."""
     out = []
     for u in list_unexplained(evidence, residuals, floors):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
-from workbench.identify.evidence.fit import Asks, Fitted, judged, slopes
+from workbench.identify.evidence.fit import Asks, Fitted, evaluate, slopes
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
@@ -64,7 +64,7 @@ def _neutral(effect: Effect) -> tuple[float, ...]:
     return tuple(p.typical if p.shapes else 0.0 for p in effect.parameters)
 
 
-def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
     """Every extension at some sizes, with the predicted gain at its best one; the best first."""
     asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
@@ -75,8 +75,8 @@ def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list
 def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:
     """The same of a hypothesis as it stands, without a fit of it."""
     (r,) = yield [h]
-    there = judged(region, options, h, r, (yield from slopes(options, h, r)))
-    return there, (yield from linearised(region, options, there))
+    there = evaluate(region, options, h, r, (yield from slopes(options, h, r)))
+    return there, (yield from linearise(region, options, there))
 
 
 def ways(probes: Sequence[Probe]) -> list[list[Probe]]:
@@ -96,7 +96,7 @@ def best_of_each(moves: Sequence[Move]) -> list[Move]:
     return list(out.values())
 
 
-def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
+def choose_moves(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
     """The best moves of one effect, as many as the beam, and as many moves of two effects, but at most two pairs per leading
     effect, since pair predictions are less reliable than the leading effect itself."""
     out, led = list(alone[:options.beam]), Counter[object]()
@@ -231,4 +231,4 @@ def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis
 
 def _judged(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, added: tuple[Candidate, ...]
             ) -> Move:
-    return Move(h, r, J, judged(region, options, h, r, J).log_posterior - f.log_posterior, added)
+    return Move(h, r, J, evaluate(region, options, h, r, J).log_posterior - f.log_posterior, added)

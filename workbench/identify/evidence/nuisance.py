@@ -58,7 +58,7 @@ def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float 
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 
 
-def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
+def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     """The robot with numbers z standard deviations from nominal; a zero becomes an effect `zero_offset`."""
     servos = {j: model.servo(j) for j in model.joints}
     zeros: list[EffectSpec] = []
@@ -135,7 +135,7 @@ def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Arra
     return model.with_physics(servos, model.effects)
 
 
-def widened(covariance: Array, by: float) -> Array:
+def widen(covariance: Array, by: float) -> Array:
     """A covariance (k, k) of numbers whose variance was 1 before any data, with the data's information as if errors were `by`
     times as large. Directions of which the data hold no information keep their variance."""
     variances, axes = np.linalg.eigh(covariance)

@@ -88,7 +88,7 @@ class Region:
             at += p.size
         return correlation_time(series)
 
-    def correlated(self, tau: float) -> Region:
+    def with_correlation_time(self, tau: float) -> Region:
         """The region with a correlation time [s]."""
         return replace(self, likelihood=replace(self.likelihood, tau=tau))
 

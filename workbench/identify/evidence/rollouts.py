@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
-from workbench.identify.evidence.nuisance import as_mapping, recalibrated
+from workbench.identify.evidence.nuisance import as_mapping, recalibrate
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
@@ -55,7 +55,7 @@ class Rollouts:
         z: dict[Uncertain, float] = {}
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
-        model = recalibrated(self.nominal, z)
+        model = recalibrate(self.nominal, z)
         for law in (h.law for h in hypotheses if h.law is not None):
             model = law.added_to(model)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))

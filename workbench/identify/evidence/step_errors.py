@@ -22,7 +22,7 @@ Residuals = Mapping[int, Array]
 Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
 
 
-def extrapolated(longer: Array, shorter: Array) -> Array:
+def extrapolate(longer: Array, shorter: Array) -> Array:
     """Residuals in the limit of a step of zero, from those at one step and at half of it, of the same shape."""
     return np.asarray(2.0 * shorter - longer)
 
@@ -45,6 +45,6 @@ class StepErrors:
             here, *finer = self.roll([RolloutRequest(model, self.takes, s, horizon=horizon) for s in steps])
             if finer:
                 longer, shorter = finer
-                self._ideal[key] = {i: extrapolated(longer[i], shorter[i]) for i in self.takes}
+                self._ideal[key] = {i: extrapolate(longer[i], shorter[i]) for i in self.takes}
             self._known[*key, step] = {i: np.nan_to_num(here[i] - self._ideal[key][i]) for i in self.takes}
         return self._known[*key, step]

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.identify.conclusions import estimates
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side, with_better
+from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish, side_by_side, with_better
 from workbench.identify.evidence.hypothesis import FAR, Hypothesis, Uncertain
-from workbench.identify.evidence.linearise import linearised, linearised_around
+from workbench.identify.evidence.linearise import linearise, linearised_around
 from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
@@ -87,8 +87,8 @@ def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Tie
     torque = f
     if len(rest) < len(f.hypothesis.effects):
         alone = Hypothesis(region.numbers, tuple(c for c, _ in rest), np.concatenate([f.hypothesis.z, *(x for _, x in rest)]))
-        torque = yield from fitting(region, options, alone, f.discrepancy, options.iterations)
-        torque = yield from polished(region, options, torque)
+        torque = yield from fit_hypothesis(region, options, alone, f.discrepancy, options.iterations)
+        torque = yield from polish(region, options, torque)
     sizes = np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)])
     without = Hypothesis(published.numbers, tuple(c for c, _ in rest), sizes)
     fits = yield from _each_alone(published, options, without, f)
@@ -100,13 +100,14 @@ def _each_alone(published: Region, options: EvidenceOptions, without: Hypothesis
     """The likeliest fit of each candidate in addition to a hypothesis, from three starts: the law fitted without it, which is
     distorted for want of it (a zero goes as far as it may where gravity leans); the law as it stands; and that of the fit f,
     which is not distorted where it has another of the candidates."""
-    bare = yield from fitting(published, options, without, f.discrepancy, options.iterations)
-    moves = list((yield from linearised(published, options, bare)))
+    bare = yield from fit_hypothesis(published, options, without, f.discrepancy, options.iterations)
+    moves = list((yield from linearise(published, options, bare)))
     as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, published.numbers)]
     for z in (without.z, np.clip(as_fitted, -FAR, FAR)):
         moves += (yield from linearised_around(published, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
-    fits = yield from side_by_side([fitting(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
-    fits = yield from side_by_side([polished(published, options, g) for g in fits])
+    fits = yield from side_by_side([
+        fit_hypothesis(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    fits = yield from side_by_side([polish(published, options, g) for g in fits])
     return list(with_better({}, fits).values())
 
 

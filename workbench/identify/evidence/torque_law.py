@@ -137,12 +137,12 @@ def torque_law(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel, 
         _radial("angle and direction", "angle and direction", degrees, options.of_angle, options),
         _radial("duty and direction", "duty", np.concatenate([duty, -duty]), options.of_duty, options),
         _radial("duty and direction", "duty and direction", np.abs(duty), options.of_duty, options),
-        _stretched(_radial("speed", "speed", np.arcsinh(np.degrees(speed) / slow), options.of_speed, options), slow))
+        _stretch(_radial("speed", "speed", np.arcsinh(np.degrees(speed) / slow), options.of_speed, options), slow))
     return TorqueLaw(joint, functions, np.zeros(sum(f.values.shape[1] for f in functions)), tried=len(options.shares),
                      full_torque=model.servo(joint).torque_at_full_duty)
 
 
-def _stretched(f: Functions, slow: float) -> Functions:
+def _stretch(f: Functions, slow: float) -> Functions:
     """Functions of arcsinh(speed / slow) as functions of speed: finer about rest."""
     return replace(f, at=slow * np.sinh(f.at))
 

@@ -179,7 +179,7 @@ def _fitted_from(search: Search, sizes: Sizes, takes: tuple[int, ...], steps: in
     return (yield from search.refitting(start, takes, steps))
 
 
-def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
+def restart_fit(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
     """A fit, or a far better one from another starting point: parameters that shape an effect make its response nonlinear, and a
     fit may end in a local minimum. steps: of the last fit."""
     starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))
