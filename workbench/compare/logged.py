@@ -28,7 +28,7 @@ def set_aside(problems: Sequence[str]) -> list[str]:
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:
-    """By joint, the servo law read from the duty register of all logs, if they have one."""
+    """The servo law of each joint, read from the duty register of all logs, if they have one."""
     logs: dict[str, list[RegisterLog]] = {}
     for t in takes:
         channels = t.recording.channels

@@ -107,7 +107,7 @@ class _Captured:
 
     @property
     def time(self) -> Array:
-        """Of the frames, from the start file's first [s]."""
+        """Times of the frames, counted from the start file's first [s]."""
         assert self.spec.frames is not None
         return np.arange(self.spec.frames) / self.start.rate
 

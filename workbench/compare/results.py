@@ -142,7 +142,7 @@ class Comparison:
         return write_whole(path, self.to_json())
 
     def table(self) -> str:
-        """The same for a person: a line for each take, then its joints, the worst first."""
+        """The comparison as text: a line for each take, then its joints, the worst first."""
         lines = []
         for take in self.takes:
             sigma = f" ± {1e3 * take.starts_at_sigma:.1f} ms" if math.isfinite(take.starts_at_sigma) else ""

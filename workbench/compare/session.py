@@ -58,7 +58,7 @@ class TakeSpec:
 
 @dataclass(frozen=True)
 class PredictSpec:
-    """To predict: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+    """What is to be predicted: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
 
     name: str
     motion: Path | None = None

@@ -204,7 +204,7 @@ def _answer(got: Frame) -> AnswerMessage:
 
 
 def log_bytes(joints: int) -> int:
-    """Of a whole LOG frame."""
+    """Length of a LOG frame of so many joints [bytes]."""
     return len(frame(FrameType.LOG, bytes(_LOG.size + 4 * joints + 3 * _SLOW.size)))
 
 

@@ -73,7 +73,8 @@ class InverseDynamics:
 
     def of(self, trajectory: RobotTrajectory, stance: Stance | None = None, floor: float | None = 0.0, name: str = "trajectory",
            ) -> InverseDynamicsResult:
-        """Of exact positions, velocities and accelerations. Base fixed: the trajectory's base may move, and the support moves it.
+        """Inverse dynamics of exact positions, velocities and accelerations. Base fixed: the trajectory's base may move, and the
+        support moves it.
 
         stance: foot -> (N,) bool, when feet are down; None: found from heights and speeds. floor: its height [m]; None: where the
         feet find it. InputError for a joint or foot that the model lacks.
@@ -85,7 +86,8 @@ class InverseDynamics:
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
     def of_motion(self, motion: Motion, cycles: int | None = None) -> InverseDynamicsResult:
-        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a fixed base.
+        """Inverse dynamics of a motion whose angles are followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a
+        fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
@@ -101,7 +103,8 @@ class InverseDynamics:
     def of_take(self, take: Take, window: float | None = None, stance: Stance | None = None, floor: float | None = None,
                 rest: Mapping[str, float] | None = None, rest_rotation: Array | None = None,
                 draws: int | None = None) -> InverseDynamicsResult:
-        """Of a take, its positions smoothed and differentiated by cubics over `window` [s] (None: 0.1, or 0.02 if simulated).
+        """Inverse dynamics of a take, whose positions are smoothed and differentiated by cubics over `window` [s] (None: 0.1, or
+        0.02 if simulated).
 
         stance, floor as in `of`. rest: joint -> angle [rad] and rest_rotation (4,) wxyz: the pose and tilt in which a zeroed
         take rested (a Measurement's rest_pose and rest_rotation). Joints that the take did not see are held at their
@@ -205,7 +208,7 @@ class InverseDynamics:
     # ---- what a take holds -------------------------------------------------------------------------------------------------
 
     def _complete(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
-        """All joints in the model's order; those that the trajectory lacks at zero."""
+        """The trajectory with all joints in the model's order; those that it lacks are at zero."""
         self._check_joints("trajectory", trajectory.joints)
         missing = [j for j in self.model.joints if j not in trajectory.joints]
         q, v, a = (self._columns(trajectory.joints, values, 0.0) for values in (trajectory.q, trajectory.v, trajectory.a))

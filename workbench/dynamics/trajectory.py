@@ -62,8 +62,8 @@ class Noise:
 
 def smooth(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB: Array, window: float,
            ) -> tuple[RobotTrajectory, Noise]:
-    """From samples of q (N, n), p_WB (N, 3) and quat_WB (N, 4) at times (N,), each smoothed and differentiated over `window`
-    [s] by `differentiate`, and the noise that their scatter shows."""
+    """A trajectory from samples of q (N, n) [rad], p_WB (N, 3) [m] and quat_WB (N, 4) wxyz at times (N,) [s], each smoothed and
+    differentiated over `window` [s] by `differentiate`, and the noise that their scatter shows."""
     quat, _ = quaternions.continuous(quat_WB)
     parts = differentiate(time, np.column_stack([q, p_WB, quat]), window)
     n = q.shape[1]

@@ -224,8 +224,8 @@ class Effect:
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the unit of docs/formats.md, as the servos' own registers tell it, and the standard error; None
-        where they do not."""
+        """The effect's first parameter, in the unit of docs/formats.md, as the servos' own registers tell it, and the standard
+        error; None where they do not."""
         return None
 
 

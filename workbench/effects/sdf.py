@@ -63,7 +63,7 @@ class SdfRobot:
         return ElementTree.tostring(self.root, encoding="unicode")
 
     def kinematics(self) -> Kinematics:
-        """Of the robot as it is now, but for its masses; parsed once for the same changes of joints and lengths."""
+        """Kinematics of the robot as changed so far, masses apart; parsed once for the same changes of joints and lengths."""
         return _kinematics.get(tuple(self._built), lambda: Kinematics.from_text(self.text(), self.path))
 
     def add_play(self, joint: str, gap: float) -> None:
@@ -142,8 +142,8 @@ class SdfRobot:
         self._built.append((link, change))
 
     def way(self, k: Kinematics, link: str) -> Array:
-        """From a link's joint to the next, of several to their mean, of a last link to its foot: (3,) [m], in its frame.
-        k: of this robot."""
+        """Vector (3,) [m], in the link's frame, from a link's joint to the next one (of several: their mean; of a last link: its
+        foot). k: kinematics of this robot."""
         joint = k.parent_joint[link]
         if joint is None:
             raise InputError(self.source, f"length of '{link}': the root link has no joint; expected a link that hangs on one")

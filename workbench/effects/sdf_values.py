@@ -60,7 +60,7 @@ def read_inertia(inertial: Element) -> tuple[float, Array, Array]:
 
 
 def write_inertia(inertial: Element, mass: float, center: Array, inertia: Array) -> None:
-    """As `read_inertia` reads it."""
+    """Writes what `read_inertia` reads."""
     write_pose(inertial, center, np.eye(3))
     set_child(inertial, "mass", float(mass))
     moments = inertial.find("inertia")

@@ -60,7 +60,7 @@ class JointMoves:
         self.others = _neighbours(model, self.focus) if len(self.focus) == 1 else ()
 
     def segments(self) -> list[Segment]:
-        """All of them, made smaller where links would come too near each other; those that stay too near are left out."""
+        """All moves, made smaller where links would come too near each other; those that stay too near are left out."""
         named = (replace(s, name=f"{' '.join(self.focus)}: {s.name}") for s in self._all())
         return [s for s in map(self.reach.scaled_clear, named) if s is not None]
 
@@ -107,7 +107,7 @@ class JointMoves:
         return path.home().segment("trembling")
 
     def _approach(self, name: str, posture: Mapping[str, float]) -> Segment:
-        """The same angle reached from both sides, by long and by short ways."""
+        """Moves that reach the same angle from both sides, from near and from far."""
         path = self._path().to(posture, EXPERIMENT.quick).hold(0.25)
         for size in (15, 0, -15, 0, 5, 0, -5, 0):
             path.to(self._offset(size, posture), EXPERIMENT.slow).hold(0.15)

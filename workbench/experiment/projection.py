@@ -43,7 +43,7 @@ class PairChannels:
 
     @staticmethod
     def join(parts: Sequence[PairChannels]) -> PairChannels:
-        """Of takes that follow each other."""
+        """The channels of takes that follow each other."""
         return PairChannels(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(PairChannels)))
 
     def chi_squared(self) -> float:
@@ -121,7 +121,7 @@ def recording_unknowns(y: Array, sight: ObservationModel) -> list[Array]:
 
 
 def with_channels(known: PairChannels, y: Array, imitator: Imitator) -> PairChannels:
-    """The same where the imitator shows y (m,), over sigma."""
+    """The pair with other channels y (m,), over sigma, of the imitator."""
     return replace(known, a=known.weight * y) if imitator == "a" else replace(known, b=known.weight * y)
 
 

@@ -103,7 +103,7 @@ class BodyMoves:
         return -1.0 if float(hip @ knee) > 0 else 1.0
 
     def _goal_error(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:
-        """From its goal to the foot (3,) [m]."""
+        """Vector from its goal to the foot (3,) [m]."""
         return self._foot(foot, joints, x) - goal
 
     def _foot(self, foot: str, joints: tuple[str, ...], x: Array) -> Array:
@@ -120,7 +120,7 @@ class BodyMoves:
 
     @cached_property
     def _length(self) -> float:
-        """Of a leg, from the joint of its thigh to its foot [m]."""
+        """Length of a leg, from the joint of its thigh to its foot [m]."""
         k = self.model.kinematics
         foot, joints = next(iter(self._legs.items()))
         hip = k.forward(np.zeros((1, 1)), joints[:1])[k.frames[joints[-2]].child][0][0]

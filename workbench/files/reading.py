@@ -73,7 +73,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def parse_json(path: str | Path, text: str, place: str = "") -> Any:
-    """As `read_json`, for a text at `place` in the file."""
+    """The same as `read_json`, for a text at `place` in the file."""
     try:
         return json.loads(text, parse_int=_bounded_int, parse_float=_finite_float, parse_constant=_finite_float)
     except json.JSONDecodeError as e:

@@ -203,7 +203,7 @@ class Fields:
         return None if value is None else Fields(self.path, value, self.at(key))
 
     def items(self) -> Iterator[tuple[str, Any]]:
-        """All keys that are left, with their values, for mappings whose keys are names."""
+        """Takes all keys that are left, with their values, for mappings whose keys are names."""
         while self._left:
             key = next(iter(self._left))
             if not isinstance(key, str):

@@ -72,7 +72,7 @@ class Certificate:
         return json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n"
 
     def summary(self) -> str:
-        """In a few lines, for a person."""
+        """The certificate in a few lines, for a person."""
         n, d = self.nominal, self.draws
         turns = n.unit == "rad/s"
         unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)

@@ -131,7 +131,8 @@ class Drawn:
 
 
 def record_draw(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
-    """Of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake played it."""
+    """The record of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake
+    played it."""
     incident = ""
     if measure.fell:
         incident = f"fell: tilt {math.degrees(measure.tilt):.0f} deg"
@@ -176,5 +177,5 @@ def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
 
 
 def _quantiles(values: NDArray[np.float64], count: int) -> list[float | None]:
-    """At QUANTILES; None for those that so few draws do not give."""
+    """Values at QUANTILES; None for those that so few draws cannot determine."""
     return [float(np.quantile(values, q)) if count >= FEWEST or q in (0.0, 0.5, 1.0) else None for q in QUANTILES]

@@ -71,7 +71,7 @@ class Ensemble:
 
     @property
     def sha256(self) -> str:
-        """Of everything that is drawn."""
+        """Digest of everything that the ensemble draws from."""
         content = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
         if self.posterior is not None:
             content += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),

@@ -61,7 +61,7 @@ class Candidate:
 
     @property
     def shape(self) -> GaitShape:
-        """In numbers."""
+        """The gait's shape in numbers."""
         return self.table.shape
 
     @cached_property

@@ -150,7 +150,7 @@ class Examiner:
         return out
 
     def compare_engines(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
-        """One of them by the compiled station and by Drake, at the same step."""
+        """Measures of one robot by the compiled station and by Drake, at the same step."""
         o = self.options
         config = SimulationConfig(base="free", time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
         (take,) = Rollouts(1).takes([self._job(robot, config, o.checked_seconds)])
@@ -177,7 +177,8 @@ class Examiner:
         return a, b
 
     def _measure(self, take: Take, model: RobotModel, seconds: float) -> Measured:
-        """As in the search, the heading settles in the first whole cycle; torque counts from power-on."""
+        """The measures of a take, as the search takes them: the heading settles in the first whole cycle; torque counts from
+        power-on."""
         period, end = self.table.period, self._walked_until(seconds)
         begin = self.table.start_seconds + period
         feet = feet_measure(take, model, self.legs, begin, period, end)

@@ -32,8 +32,8 @@ class FeetMeasure:
 
 def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float, end: float = math.inf,
                  ) -> FeetMeasure:
-    """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping over the whole take. Positions of
-    feet are from the model's kinematics; for a tilted foot its lowest point counts."""
+    """Measures of the feet in a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping over the whole
+    take. Positions of feet are from the model's kinematics; for a tilted foot its lowest point counts."""
     height, speed = _lowest(take, model, legs)  # speed (N-1, F), between rows
     inside = (take.time >= begin - 1e-9) & (take.time <= end + 1e-9)
     z = height - _floor(height, take.time < 0)
@@ -46,8 +46,8 @@ def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: fl
 
 
 def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array, Array]:
-    """Of each foot's lowest point: its height in W (N, F) [m], and the speed along the ground (N-1, F) [m/s] at which the point
-    of the link that touches there moves until the next row; a foot that rolls does not slip."""
+    """Height and speed of each foot's lowest point: its height in W (N, F) [m], and the speed along the ground (N-1, F) [m/s] at
+    which the point of the link that touches there moves until the next row; a foot that rolls does not slip."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     poses, R_WB = model.kinematics.forward(take.q, take.joints), quaternions.matrix(take.quat_WB)
@@ -68,7 +68,7 @@ def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array
 
 
 def _floor(z: Array, resting: NDArray[np.bool_]) -> Array:
-    """Where each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
+    """Height at which each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
     return np.asarray(np.median(z[resting], axis=0) if resting.any() else z.min(axis=0))
 
 

@@ -59,7 +59,8 @@ def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Seque
 
 
 def _way_back(machine: GaitMachine, request: Request, gait: Candidate, options: CertifyOptions) -> Margin:
-    """As the certificate has it, on the nominal robot: seconds, where fresh robots and the rest of a certificate take minutes."""
+    """The certificate's limit on the way back to the cycle, on the nominal robot. It takes seconds, where fresh robots and the
+    rest of a certificate take minutes."""
     examiner = Examiner(request.on_slope(machine.model), machine.legs, gait_table(machine, gait.shape), options)
     return return_margin(examiner.limit_cycle(vendor_table(machine.model)), request.limits)
 

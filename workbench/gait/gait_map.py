@@ -195,7 +195,7 @@ class _Search:
         return [self.shape(x) for x in archive.data("solution")]
 
     def measure(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[Cell]:
-        """Of gaits whose motion on these robots is in the same cell, the one that differs least from robot to robot."""
+        """The cells that these gaits fill: of gaits in the same cell, the one that differs least from robot to robot."""
         cells: dict[tuple[int, int], Cell] = {}
         for shape, judged in zip(shapes, self.judge(shapes, robots)):
             if judged is not None:
@@ -214,12 +214,12 @@ class _Search:
         return row, column
 
     def shape(self, x: Array) -> GaitShape:
-        """Of a point of the unit cube."""
+        """The shape at a point of the unit cube."""
         return self.space.shape(np.asarray(x, dtype=float), self.options.family, self.options.knees)
 
     def judge(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]
               ) -> list[tuple[float, tuple[float, float]] | None]:
-        """Of each shape the objective, and the median speed and turning of the robots; None where one falls, a limit is broken,
+        """The objective of each shape, and the median speed and turning of the robots; None where one falls, a limit is broken,
         or these are beyond the map's range."""
         o, out = self.options, list[tuple[float, tuple[float, float]] | None]()
         for motions in self.play(self.tables(shapes), robots):
@@ -232,7 +232,7 @@ class _Search:
         return out
 
     def tables(self, shapes: Sequence[GaitShape]) -> list[GaitTable | None]:
-        """None for shapes beyond the legs' reach, or whose tables break a limit."""
+        """The table of each shape; None for shapes beyond the legs' reach, or whose tables break a limit."""
         limits, out = GaitLimits(), list[GaitTable | None]()
         for paths in paths_of(self.machine, shapes):
             try:

@@ -103,7 +103,8 @@ def came_back(name: str, take: Take, cycles: Array, own: Array) -> Return:
 
 
 def _entries(table: GaitTable, watched: int, other: PoseTable | None) -> list[_Entry]:
-    """Into the loop at full speed from neutral, at three phases; with a pose that got lost; from another table."""
+    """The entries that are tried: into the loop at full speed from neutral, at three phases; with a pose that got lost; from
+    another table."""
     loop, period = table.cycle, table.period
     every = loop.commands(watched + 1)
     out = []
@@ -149,7 +150,7 @@ def _spin(before: Array, after: Array) -> Array:
 
 
 def _from(c: Commands, first: int) -> Commands:
-    """From one of the commands on, which then is at time 0."""
+    """The commands from one of them on, which then is at time 0."""
     return Commands(c.times[first:] - c.times[first], c.joints, c.goals[first:], c.speeds[first:], c.enabled[first:],
                     c.end - float(c.times[first]), c.poses[first:])
 
@@ -162,7 +163,7 @@ def _drop_command(c: Commands, lost: int) -> Commands:
 
 
 def _after(before: Commands, c: Commands) -> Commands:
-    """One schedule, then another."""
+    """One schedule followed by another."""
     c = c.reordered(before.joints)
     goals, speeds, enabled, poses = (np.concatenate([getattr(before, f), getattr(c, f)])
                                      for f in ("goals", "speeds", "enabled", "poses"))

@@ -64,12 +64,12 @@ class GaitMachine:
 
     @cached_property
     def inverse_dynamics(self) -> InverseDynamics:
-        """Of the robot on its feet."""
+        """Inverse dynamics of the robot on its feet."""
         return InverseDynamics(self.model)
 
     @property
     def leg_length(self) -> float:
-        """Of the shortest leg in neutral [m]."""
+        """Length of the shortest leg in neutral [m]."""
         return min(leg.length for leg in self.legs)
 
     @cached_property

@@ -182,16 +182,16 @@ class _Draws:
     folder: Path
 
     def searching(self) -> list[RobotModel]:
-        """Those of the search, floor and supply spread evenly."""
+        """Robots for the search, floor and supply spread evenly."""
         return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder, even=True)
 
     def screening(self) -> list[RobotModel]:
-        """Those of the finalists."""
+        """Robots for the finalists."""
         count = max(self.options.screening.rounds, default=0)
         return self.ensemble.draws(self.model, count, SCREENED + self.options.seed, self.folder)
 
     def certifying(self) -> list[RobotModel]:
-        """Those of the certificate."""
+        """Robots for the certificate."""
         return self.ensemble.draws(self.model, self.options.certify.draws, 2 * self.options.seed + 1, self.folder)
 
 
@@ -217,8 +217,8 @@ def sought(request: Request) -> Request:
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
              progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
-    """Of a speed that no gait has: the nearest table, after a first look for the fastest. On a slope on which nothing stands, or
-    with servos that may not even hold it up, there is none."""
+    """The answer to a speed that no gait has: the nearest table, after a first search for the fastest. On a slope on which
+    nothing stands, or with servos that may not even hold it up, there is none."""
     problem = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, problem, None, None, None)
@@ -272,7 +272,7 @@ def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | Non
 
 
 def _without_speed(margins: Sequence[Margin]) -> list[Margin]:
-    """Of a gait that is too slow: what keeps it from being faster, if something else is at its limit."""
+    """The margins that keep a gait from being faster, where any is at its limit."""
     tight = [m for m in margins if m.kind != "speed" and m.use > 0.97 and not m.advice]
     return tight or list(margins)
 

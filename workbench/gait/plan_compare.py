@@ -75,7 +75,7 @@ def compare_plan(machine: GaitMachine, planned: Planned, table: GaitTable, take:
 
 
 def _rms(x: Array) -> float:
-    """Of vectors (N, 3)."""
+    """RMS length of vectors (N, 3)."""
     return float(np.sqrt((x**2).sum(axis=1).mean()))
 
 

@@ -27,7 +27,7 @@ class Plans:
     asked: int = 0
 
     def with_refined(self, before: Found, after: Found) -> Plans:
-        """With the programme behind the best gait of a search also behind those that were refined from it."""
+        """The plans, in which gaits refined from the best one of a search belong to its programme."""
         planned, known = self.of(before.best.shape), {before.best.shape, *(c.shape for c in before.others)}
         new = [c.shape.offsets for c in (after.best, *after.others) if c.shape not in known]
         return self if planned is None else replace(self, solved={**self.solved, **dict.fromkeys(new, planned)})

@@ -131,7 +131,7 @@ class Goal:
 
     @staticmethod
     def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> Goal:
-        """At a shape, from its runs on all of the evaluator's robots."""
+        """The goal at a shape, from its runs on all of the evaluator's robots."""
         request, few = evaluator.request, options.robots
         nominal, *draws = evaluator.measure([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
         order = sorted(range(len(draws)), key=lambda k: request.progress(draws[k]))
@@ -146,14 +146,14 @@ class Goal:
                      max(request.progress(nominal), SLOWEST), limits)
 
     def residuals(self, shapes: Sequence[GaitShape]) -> list[Array]:
-        """Of each shape (R,)."""
+        """Residuals of each shape (R,)."""
         measures = self.evaluator.measure([(s, robot) for s in shapes for robot in self.robots])
         n = len(self.robots)
         return [np.concatenate([self._of(m, nominal=i == 0) for i, m in enumerate(measures[k:k + n])])
                 for k in range(0, len(measures), n)]
 
     def _of(self, m: GaitMeasure, nominal: bool) -> Array:
-        """Of one robot: of speed and heading, then one for each limit and place."""
+        """Residuals of one robot: speed and heading, then one for each limit and place."""
         o, request = self.options, self.evaluator.request
         uses = _uses(self.evaluator, m, nominal)
         if m.fell:
@@ -184,7 +184,7 @@ def _uses(evaluator: Evaluator, m: GaitMeasure, nominal: bool) -> dict[tuple[str
 
 
 def _largest(uses: Mapping[tuple[str, str], float]) -> dict[str, float]:
-    """Of each name over its places."""
+    """The largest of each name over its places."""
     out: dict[str, float] = {}
     for (name, _), use in uses.items():
         out[name] = max(use, out.get(name, 0.0))
@@ -209,7 +209,7 @@ class _Basis:
 
     @staticmethod
     def of(machine: GaitMachine, shape: GaitShape, harmonics: int) -> _Basis:
-        """Of a gait that goes straight."""
+        """The directions of a gait that goes straight."""
         phases = 2 * np.pi * np.arange(shape.poses) / shape.poses
         waves = [np.ones(shape.poses), *(f(k * phases) for k in range(1, harmonics + 1) for f in (np.cos, np.sin))]
         (even,) = paths_of(machine, [replace(shape, offsets=(), turn=0.0, side=0.0)])
@@ -219,7 +219,7 @@ class _Basis:
         return _Basis(shape, offsets, _pairs(machine, even.q, shift), np.stack(waves, axis=1), shift)
 
     def shape(self, x: Array) -> GaitShape:
-        """With the changes x (size,) [rad]."""
+        """The shape with the changes x (size,) [rad]."""
         out = self.offsets.copy()
         for (left, right, sign), numbers in zip(self.pairs, x.reshape(len(self.pairs), -1)):
             change = self.waves @ numbers

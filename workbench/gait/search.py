@@ -134,7 +134,8 @@ class _Run:
         return out[:self.budget.starts]
 
     def try_on_draws(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Each on the robots of the ensemble, those apart that do not even walk on the nominal one."""
+        """Tries candidates on the robots of the ensemble; those that do not even walk on the nominal one are returned as they
+        are."""
         return self.evaluator.judge([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
 
     def note_generation(self, candidates: Sequence[Candidate]) -> None:
@@ -225,7 +226,7 @@ class _Refiner:
         return replace(shape, poses=start.poses, offsets=start.offsets) if start.offsets else shape
 
     def generation(self) -> None:
-        """One generation on the nominal robot, and its better part on the ensemble."""
+        """Tries one generation on the nominal robot, and its better part on the ensemble."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
         judged = run.evaluator.judge([self._shape(x) for x in points], 0)
@@ -249,8 +250,9 @@ class _Refiner:
 
 
 def steer(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
-    """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
-    need not be searched for. First by as much as it turns, then by the secant of two runs, `times` in all."""
+    """Steers candidates that drift too much against their drift, and keeps the change where it makes them better: how much a gait
+    turns is known from its run, and need not be searched for. First by as much as it turns, then by the secant of two runs,
+    `times` in all."""
     request, out = evaluator.request, list(candidates)
     if "turn" not in space.names or request.way == "turn":
         return out

@@ -63,12 +63,12 @@ class GaitShape:
 
     @property
     def phases(self) -> Array:
-        """Of the poses' arrivals (poses,), as shares of the cycle; the last closes it."""
+        """Phases at which the poses arrive (poses,), as shares of the cycle; the last closes it."""
         return np.asarray((np.arange(self.poses) + 1) / self.poses)
 
     @property
     def period(self) -> float:
-        """Of a cycle [s]."""
+        """Duration of a cycle [s]."""
         return 1 / self.frequency
 
     @staticmethod
@@ -90,7 +90,7 @@ class FootPath:
 
 
 def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: Array | float = 1.0) -> FootPath:
-    """Of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
+    """Path of each foot of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
 
     On the ground a foot goes straight back at an even pace, as the body advances and turns above it; in the air it comes
     forward on half a cosine and up on half a sine. Which foot is which follows from where it is in neutral.

@@ -50,7 +50,7 @@ class GaitTable:
 
     @property
     def period(self) -> float:
-        """Of one cycle [s], in whole milliseconds a pose."""
+        """Duration of one cycle [s], in whole milliseconds a pose."""
         return float(self.cycle.dwells_ms.sum()) / 1000
 
 
@@ -74,7 +74,7 @@ class Paths:
 
 
 def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
-    """Of many shapes at once."""
+    """The paths of many shapes at once."""
     wanted = []
     for shape in shapes:
         sizes = np.repeat([1.0, HALF, 0.0], [shape.poses, shape.poses, 1])
@@ -83,8 +83,8 @@ def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
 
 
 def _paths(shape: GaitShape, every: Array, off: Array, stances: NDArray[np.bool_]) -> Paths:
-    """Of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for offsets of
-    another number of poses or joints."""
+    """The paths of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for
+    offsets of another number of poses or joints."""
     P, extra = shape.poses, np.array(shape.offsets)
     if not shape.offsets:
         extra = np.zeros_like(every[:P])

@@ -124,7 +124,7 @@ class _Programme:
         self.guess_q = q
 
     def put(self, variables: Array, values: Array) -> None:
-        """Into the guess."""
+        """Sets the initial guess."""
         self.prog.SetDecisionVariableValueInVector(variables, values, self.guess)
 
     def _kinematics(self) -> None:
@@ -218,7 +218,8 @@ class _Programme:
 
 
 class _Foot:
-    """Where a foot is less where it should be (3,) [m], of the base's place and tilt, the leg's angles and the placement."""
+    """Vector (3,) [m] from where a foot should be to where it is, a function of the base's place and tilt, the leg's angles and
+    the placement."""
 
     def __init__(self, leg: Leg, target: Array) -> None:
         self.leg, self.target = leg, target

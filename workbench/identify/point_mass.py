@@ -38,7 +38,7 @@ class PointMass(Candidate):
         return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of the sizes x."""
+        """Bounds of the sizes x, lower and upper."""
         low, high = super().bounds()
         low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
@@ -58,7 +58,7 @@ class PointMass(Candidate):
 
     @property
     def makes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those without which there is no effect."""
+        """Which sizes make the effect: where all are 0, it is not there."""
         return np.arange(self.size) == 0
 
 
@@ -76,17 +76,17 @@ class SwungMass(PointMass):
 
     @property
     def shapes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that only shape the effect."""
+        """Which sizes only shape the effect."""
         return np.array([True, False, False])
 
     @property
     def of_vector(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that are a vector's."""
+        """Which sizes are components of a vector."""
         return ~self.shapes
 
     @property
     def makes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those without which there is no effect."""
+        """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
@@ -101,7 +101,7 @@ class SwungMass(PointMass):
         return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of the sizes x."""
+        """Bounds of the sizes x, lower and upper."""
         return np.array([FIT.swung_doublings[0], -FIT.most_moment, -FIT.most_moment]), np.array(
             [FIT.swung_doublings[1], FIT.most_moment, FIT.most_moment]
         )

@@ -184,7 +184,7 @@ def slow_poses(motion: Motion) -> str | None:
 
 
 def serious(problems: Sequence[str]) -> list[str]:
-    """Those that are not routine."""
+    """The problems that are not routine."""
     return [text for text in problems if not isinstance(text, RoutineProblem)]
 
 

@@ -274,7 +274,7 @@ def _yaml(path: Path) -> Inspection:
 
 
 def _nominal(path: Path, model: object) -> ServoConstants:
-    """Of a servo of which the file names only the model."""
+    """Constants of a servo of which the file names only the model."""
     try:
         return servo_profile(str(model)).constants()
     except InputError as e:

@@ -119,7 +119,8 @@ class Motion:
                        speeds=None if self.speeds is None else self.speeds[rows])
 
     def as_table(self) -> PoseTable:
-        """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for values that the registers cannot hold."""
+        """The motion in the firmware's units (thesis, equations 3.1 to 3.4); InputError for values that the registers cannot
+        hold."""
         return PoseTable.from_angles(
             self.joints, self.times, self.angles, self.source, self.speeds, self.units, self.start, self.stop)
 

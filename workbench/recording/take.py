@@ -87,7 +87,7 @@ class Take:
         return replace(self, q=self.q - np.nanmean(self.q[self.resting], axis=0), zeroed=True)
 
     def first(self, frames: int) -> Take:
-        """Its first frames."""
+        """The take's first frames."""
         def cut(column: Array | None) -> Array | None:
             return None if column is None else column[:frames]
 

@@ -140,7 +140,7 @@ def _constants(f: Fields, key: str, value: Any, by_family: bool) -> ServoConstan
 
 
 def _nominal(f: Fields, key: str, name: Any) -> ServoConstants:
-    """Of a servo of which only the name is known."""
+    """Constants of a servo of which only the name is known."""
     try:
         return replace(servo_profile(str(name)).constants(), model=str(name))
     except InputError as e:

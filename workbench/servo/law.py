@@ -57,7 +57,7 @@ class ServoLaw:
 
     @property
     def damping(self) -> Array:
-        """All that a joint loses per speed while its servo is on: back-EMF and viscous friction [N m s/rad]."""
+        """Damping of a joint whose servo is on: back-EMF and viscous friction [N m s/rad]."""
         return self.back_emf + self.viscous
 
     def duty(self, error: Array, velocity: Array | float = 0.0) -> Array:

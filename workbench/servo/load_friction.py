@@ -25,16 +25,16 @@ class LoadFrictionTerm(ServoTerm):
     backdrive: Array
 
     def friction(self, now: Instant) -> Array:
-        """By the load [N m]."""
+        """Friction (n,) [N m] at the present load."""
         share = self.coefficient + self.static * np.exp(-np.square(now.velocity / self.speed))
         share = share + self.backdrive * np.maximum(-np.sign(now.motor) * now.direction, 0.0)
         return np.asarray(share * np.abs(now.load))
 
     def most_friction(self, law: ServoLaw) -> Array:
-        """At MOST_LOAD [N m]."""
+        """Friction (n,) [N m] at MOST_LOAD."""
         return np.asarray((self.coefficient + self.static + self.backdrive) * MOST_LOAD * law.full_torque)
 
     def numbers(self) -> TermNumbers:
-        """All of it."""
+        """All numbers of the term."""
         return TermNumbers(rubbing=self.coefficient, rubbing_still=self.static, rubbing_speed=self.speed,
                            rubbing_backwards=self.backdrive)

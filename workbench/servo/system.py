@@ -170,7 +170,7 @@ class ServoBank(LeafSystem):
         return np.asarray(np.clip(force, -self.law.coulomb, self.law.coulomb), dtype=float)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Of the bristles."""
+        """Derivatives of the bristles' deflections [rad/s]."""
         if self._bristles:
             derivatives.SetFromVector(self._bristle_rate(context, self._state.Eval(context)[self._x_v])[1])
 

@@ -49,7 +49,7 @@ class RunLogs:
         return state[:, self._q], state[:, self._plant.num_positions() + self._v]
 
     def joints_named(self, names: tuple[str, ...], state: Array) -> tuple[Array, Array]:
-        """As `joints`, of any joints of the plant with one angle each."""
+        """The same as `joints`, for any joints of the plant with one angle each."""
         found = [self._plant.GetJointByName(n) for n in names]
         q, v = ([j.position_start() for j in found], [j.velocity_start() for j in found])
         return state[:, q], state[:, self._plant.num_positions() + np.array(v, dtype=int)]

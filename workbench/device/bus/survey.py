@@ -81,7 +81,7 @@ class Survey:
         return [f"{len(off)} of {len(self.found)} servos read {span}; expected {low:g} to {high:g} V"]
 
     def registers(self) -> ServoRegisters:
-        """As evidence of a session."""
+        """The registers as evidence of a session."""
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         return ServoRegisters(self.profile.name, now, {
             s.joint: ServoReading(s.id, s.model, s.registers) for s in self.found.values() if s.joint is not None})

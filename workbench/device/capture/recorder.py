@@ -151,7 +151,7 @@ class Recorder:
         return f"recording, {c.received} frames, {c.lost} lost, {c.broken} broken, {bodies}"
 
     def _take(self, journal: Journal, arrival: float, data: bytes) -> None:
-        """One packet, whatever it holds."""
+        """Takes one packet, whatever it holds."""
         journal.packet(arrival, data)
         known, broken = len(self.names), self.counts.broken
         frame = self._stream.take(arrival, data)

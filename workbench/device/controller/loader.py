@@ -134,7 +134,7 @@ class Loading:
         return heard
 
     def _at_prompt(self, heard: bytes) -> bool:
-        """Its last line is a prompt and nothing else; echoes of our key may be mixed in."""
+        """Whether the last line received is a prompt and nothing else; echoes of our key may be mixed in."""
         last_line = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
         return last_line in self._profile.prompt
 
@@ -162,7 +162,8 @@ class Loading:
             self._line.write(data[at:at + CHUNK])
 
     def _expect(self, texts: tuple[bytes, ...], seconds: float, when: str, refused: tuple[bytes, ...] = ()) -> bytes:
-        """Its output up to one of these texts, or of `refused`; LoadError at a failure, or if none of them comes."""
+        """What the loader sends up to one of these texts, or one of `refused`; LoadError at a failure, or if none of them
+        comes."""
         heard, waited = b"", 0.0
         while not any(text in heard for text in (*texts, *refused)):
             failed = [text for text in self._profile.failure if text in heard]
@@ -216,7 +217,7 @@ class Loading:
         self._line.reopen()
 
     def _until_quiet(self) -> bytes:
-        """Its output until it has been silent for a while."""
+        """What the loader sends until it has been silent for a while."""
         heard = new = self._collect(QUIET)
         while new:
             new = self._collect(QUIET)

@@ -69,7 +69,7 @@ class StopAskedError(Exception):
 
 
 class NothingPlayedError(BusError):
-    """It was stopped before it played, and released; `reason` as `stop` said it."""
+    """Stopped before it played, and released. reason: as given by `stop`."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -91,7 +91,7 @@ class Controller:
         return float(self._port.getCurrentTime()) / 1000
 
     def state(self) -> StateMessage:
-        """Its present state; BusError where nothing answers in its frames."""
+        """The controller's present state; BusError where nothing answers in its frames."""
         for _ in range(3):
             self._send(frame(FrameType.ASK))
             found = self._wait(lambda m: isinstance(m, StateMessage), 0.5)

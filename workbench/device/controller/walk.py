@@ -65,7 +65,7 @@ class CycleController(Controller):
 
 
 def _news(m: Message) -> bool:
-    """That it does not walk any more, or that the next table's first pose was out of reach."""
+    """Whether a message reports that the controller no longer walks, or that the next table's first pose was out of reach."""
     if isinstance(m, StateMessage):
         return m.state != ControllerState.PLAY or m.table_fault != "none"
     return isinstance(m, LogMessage) and m.state != ControllerState.PLAY

@@ -131,7 +131,7 @@ class _Performance:
                                self.rig.ids[joint], joint)
 
     def _ramp(self, target: Mapping[str, float], what: str) -> None:
-        """All joints to a pose, smoothly, the farthest at the ramp's speed."""
+        """Moves all joints to a pose, smoothly, the farthest at the ramp's speed."""
         start, options = dict(self.goals), self.options
         duration = max(max(abs(target[j] - start[j]) for j in start) / options.ramp_speed, 0.3)
         bus, last, gone = self.rig.bus, self.rig.bus.now(), 0.0
@@ -191,7 +191,8 @@ class _Performance:
         self._read_until(self.rig.bus.now() + self.options.rest)
 
     def _poses(self, commands: Commands) -> None:
-        """Each pose at its time after the first, however late the one before it was; its time is that of its packet's end."""
+        """Sends each pose at its time after the first, however late the one before it was; its time is that of its packet's
+        end."""
         rig, bus = self.rig, self.rig.bus
         self.started, self.read_before = bus.now(), Counter(self.rig.readings)
         packet, self.missed_before = 0.0, rig.missed
@@ -257,7 +258,7 @@ class _Performance:
             self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
 
     def _let_go(self) -> bool:
-        """On a bus that may be gone; whether all servos have confirmed it."""
+        """Releases all servos of a bus that may be gone; whether all have confirmed it."""
         try:
             unknown = self.rig.release()
             self.rig.limit_torque(1)

@@ -80,7 +80,7 @@ class ServoBus:
         self._hosts.append(host)
 
     def add(self, servo: VirtualServo) -> None:
-        """Another servo on the chain."""
+        """Adds a servo to the chain."""
         self.servos.append(servo)
 
     def talk(self, talker: object, values: bytes, rate: int, starts: Sequence[int] | int) -> int:
@@ -202,7 +202,7 @@ class ServoBus:
             self.clock.at(end, partial(self._one_packet, what, ids[1:], key, end, head, so_far + data))
 
     def _collide(self, one: Burst, two: Burst) -> None:
-        """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""
+        """Garbles bytes of two senders that overlap; the stop bit breaks."""
         k = one.done
         for i, end in enumerate(two.ends):
             start = end - two.byte

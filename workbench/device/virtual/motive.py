@@ -74,11 +74,11 @@ class VirtualMotive:
         return self._clock + (now - self.started) * self._ratio
 
     def mid_exposure(self, number: int) -> float:
-        """Of a frame, on the server's clock [s]."""
+        """Time of a frame's mid-exposure on the server's clock [s]."""
         return self.clock(self.started + (number - self.first_number) / self.rate)
 
     def answer(self, data: bytes, now: float) -> list[bytes]:
-        """Its answer to a packet at a time [s] of the caller's clock."""
+        """The server's answer to a packet at a time [s] of the caller's clock."""
         kind, size = struct.unpack_from("<HH", data)
         payload = data[4:4 + size]
         if kind == Message.CONNECT:

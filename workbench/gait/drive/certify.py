@@ -87,7 +87,7 @@ class FamilyCertificate:
         return not self.problems
 
     def summary(self) -> str:
-        """In a few lines, for a person."""
+        """The certificate in a few lines, for a person."""
         d, deg = self.draws, np.degrees
         lines = [f"turns up to {self.most:g} rad and sideways strides up to {1000 * self.most_side:g} mm per stance, changes up "
                  f"to {self.most_change:g} rad and {1000 * self.most_side_change:g} mm: {d['falls']} of {d['count']} "
@@ -101,7 +101,7 @@ class FamilyCertificate:
         return "\n".join([*lines, *(f"not kept: {p}" for p in self.problems)])
 
     def to_json(self) -> dict[str, Any]:
-        """As in the file, with the sum that finds changes."""
+        """Content of the certificate's file, with the checksum that reveals changes."""
         content = plain({"format": FORMAT, "claim": CLAIM, "kept": self.kept, **vars(self), "step_map": vars(self.step_map)})
         return {**content, "sha256": _digest(content)}
 
@@ -145,7 +145,7 @@ def broken_limits(family: GaitFamily, o: FamilyOptions) -> list[str]:
 
 
 def bounded_steers(rng: np.random.Generator, o: FamilyOptions) -> list[Steer]:
-    """Of each of the cycles, at random within the largest turn, sideways stride and changes; all limits are met."""
+    """Steering of each cycle, at random within the largest turn, sideways stride and changes; all limits are met."""
     most, change = np.array([o.most, o.most_side]), np.array([o.most_change, o.most_side_change])
     out, last = list[Steer](), np.zeros(2)
     for _ in range(0, o.cycles, o.hold):
@@ -189,7 +189,7 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
 
 
 def gait_sha256(gait: str | Path) -> str:
-    """Of the tables that the gait's certificate speaks of. InputError where it cannot be read."""
+    """Digest of the tables that the gait's certificate states. InputError where it cannot be read."""
     return read_certificate(Path(gait).parent / NAME).tables["gait"]
 
 

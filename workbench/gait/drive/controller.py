@@ -100,7 +100,7 @@ class CycleController(LeafSystem):
         return plan(left, heading, _next(x), x[at.BIAS], targets, m, self.options, bounds)
 
     def planned_points(self, context: Context) -> Array:
-        """Where the plan leads from the present state: positions (N + 1, 2) [m] from the cycle after next on."""
+        """Planned positions from the present state: (N + 1, 2) [m] from the cycle after next on."""
         x = np.array(context.get_discrete_state(0).value())
         m = self._own(x)
         _, left = self.path.project(x[[at.X, at.Y]], x[at.ALONG])
@@ -110,7 +110,7 @@ class CycleController(LeafSystem):
 
 
 def _next(x: Array) -> Steer:
-    """Of the cycle that is on the controller already."""
+    """Steering of the cycle that is on the controller already."""
     return Steer(x[at.NEXT], x[at.NEXT_SIDE])
 
 

@@ -56,14 +56,14 @@ class GaitFamily:
         return self._enter(self._loop(steer, pace), self._loop(before, pace_before))
 
     def stop(self, before: Steer = STRAIGHT) -> PoseTable:
-        """From a cycle steered by `before` to neutral, going straight."""
+        """The poses from a cycle steered by `before` to neutral, going straight."""
         straight = self._table(STRAIGHT)
         rest = _part(straight.cycle, slice(self.phase, None))
         return self._enter(join_tables([rest, straight.stop], "drive"), self._loop(before, 1.0))
 
     @property
     def start(self) -> PoseTable:
-        """From neutral into the gait, going straight."""
+        """The poses from neutral into the gait, going straight."""
         straight = self._table(STRAIGHT)
         if not self.phase:
             return straight.start
@@ -76,7 +76,7 @@ class GaitFamily:
 
     @property
     def period(self) -> float:
-        """Of one cycle [s], the same for all of the family."""
+        """Duration of one cycle [s], the same for the whole family."""
         return self._table(STRAIGHT).period
 
     def sequence(self, steers: Sequence[Steer]) -> Commands:

@@ -131,7 +131,7 @@ def _walk(walk: Walk, path: WayPath, controller: CycleController, most_cycles: i
 
 
 def _decide(controller: CycleController, context: Context, seen: Array) -> tuple[Steer, float, str]:
-    """One update: what the cycle after next is steered by, the estimated bias [rad per cycle], and the reason to stop or ""."""
+    """One update: the steering of the cycle after next, the estimated bias [rad per cycle], and the reason to stop or ""."""
     controller.GetInputPort("pose").FixValue(context, seen)
     context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
     turn, side, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context))

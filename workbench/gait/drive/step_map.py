@@ -105,7 +105,8 @@ def rows_of(take: Take, steers: Sequence[Steer], family: GaitFamily) -> tuple[Ar
 
 
 def increments(poses: Array) -> Array:
-    """Of poses (N + 1, 3): ahead, aside [m] in the frame at each cycle's beginning, and heading change [rad], (N, 3)."""
+    """Increments (N, 3) between poses (N + 1, 3): ahead and aside [m] in the frame at each cycle's beginning, and heading change
+    [rad]."""
     step, yaw = np.diff(poses, axis=0), poses[:-1, 2]
     ahead = np.cos(yaw) * step[:, 0] + np.sin(yaw) * step[:, 1]
     aside = -np.sin(yaw) * step[:, 0] + np.cos(yaw) * step[:, 1]

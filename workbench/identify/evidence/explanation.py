@@ -206,7 +206,8 @@ class Explanation:
         return (*list_leftover(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
-        """All frames were searched: what got no name is no gap, unless it shows."""
+        """Whether what is left is too slight to be a gap: all frames were searched, so that only an unexplained residual is
+        one."""
         return True
 
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:

@@ -40,11 +40,11 @@ class Fitted:
 
     @property
     def log_posterior(self) -> float:
-        """But for a constant [nats]."""
+        """Logarithm of the posterior, up to a constant [nats]."""
         return self.log_evidence + self.log_prior
 
     def covariance(self, region: Region, options: EvidenceOptions) -> Array:
-        """Of theta (k, k)."""
+        """Covariance of theta (k, k)."""
         h, likelihood = self.hypothesis, region.likelihood
         H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
         if self.too_much is not None:
@@ -59,7 +59,7 @@ class Fitted:
 
 
 def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
-    """Of each set of effects the likelier fit."""
+    """The likelier fit of each set of effects."""
     out = dict(fits)
     for f in more:
         out[f.hypothesis.key] = max(f, out.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
@@ -67,7 +67,7 @@ def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key,
 
 
 def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> Array:
-    """Of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
+    """Covariance of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
     assert f.hypothesis.law is not None
     assert f.beside is not None
     A = np.hstack([f.J, f.beside])

@@ -57,7 +57,7 @@ def term_of(c: Candidate) -> Term:
 
 
 def labels_of(c: Candidate) -> list[Label]:
-    """Of the sizes of a candidate, whichever options it has."""
+    """Labels of a candidate's sizes, whichever options it has."""
     fitted = [p.name for p, fixed in zip(c.parameters, c.fixed) if not fixed]
     if len(fitted) != c.size:  # moments, of a mass that swings
         fitted = ["size"] * c.size
@@ -82,17 +82,17 @@ class Hypothesis:
 
     @property
     def z(self) -> Array:
-        """Of the recalibrated numbers."""
+        """The recalibrated numbers (standard deviations from nominal)."""
         return self.theta[:len(self.numbers)]
 
     @property
     def labels(self) -> list[Label]:
-        """Of theta's numbers."""
+        """Labels of theta's numbers."""
         nominal = [("", (n.joint,), n.name, 0) for n in self.numbers]
         return [*nominal, *(label for c in self.effects for label in labels_of(c))]
 
     def slices(self) -> list[slice]:
-        """Of theta, for each effect."""
+        """The part of theta that belongs to each effect."""
         ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
@@ -104,7 +104,7 @@ class Hypothesis:
         return [[k, s.start] for k, s in both if k is not None]
 
     def sizes(self) -> list[tuple[Candidate, Array]]:
-        """Each effect with its sizes."""
+        """Each effect with its part of theta."""
         return [(c, self.theta[s]) for c, s in zip(self.effects, self.slices())]
 
     def specs(self) -> list[EffectSpec]:
@@ -112,11 +112,11 @@ class Hypothesis:
         return [c.spec(x) for c, x in self.sizes()]
 
     def at(self, theta: Array) -> Hypothesis:
-        """The same with other numbers."""
+        """The same hypothesis with other numbers theta."""
         return replace(self, theta=np.asarray(theta, dtype=float))
 
     def with_effect(self, c: Candidate, x: Array) -> Hypothesis:
-        """With one effect more; in the place of the same one with other options."""
+        """The hypothesis with one more effect, which replaces the same one with other options."""
         bare = self.without(lambda other: (other.name, other.where) == (c.name, c.where))
         return replace(bare, effects=(*bare.effects, c), theta=np.concatenate([bare.theta, x]))
 
@@ -126,7 +126,7 @@ class Hypothesis:
         return replace(self, effects=tuple(c for c, _ in keep), theta=np.concatenate([self.z, *(x for _, x in keep)]))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of theta."""
+        """Bounds of theta, lower and upper."""
         n = len(self.numbers)
         ends = [(np.full(n, -FAR), np.full(n, FAR)), *(c.bounds() for c in self.effects)]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
@@ -146,7 +146,7 @@ class Prior:
 
     @classmethod
     def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
-        """Of a hypothesis, whatever its sizes; the same object for the same numbers and effects."""
+        """The prior of a hypothesis, whatever its sizes; the same object for the same numbers and effects."""
         return _prior(len(h.numbers), h.effects, options)
 
     def rows(self, theta: Array) -> Array:
@@ -176,7 +176,7 @@ class Prior:
 
 
 def log_odds(names: int, expected: float) -> float:
-    """By which each effect more is less likely before any data, of so many names, of which `expected` are thought to be there."""
+    """Prior log odds of one more effect [nats], among so many names, of which `expected` are thought to be there."""
     share = min(0.5, expected / max(names, 1))
     return float(np.log(share / (1 - share)))
 

@@ -23,7 +23,7 @@ FULL = 0.9
 
 
 class _Event(NamedTuple):
-    """From its first instant of the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad,
+    """An event: its first instant on the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad,
     rad/s], and duty, NaN where it was not logged."""
 
     begin: float
@@ -50,7 +50,7 @@ def list_leftover(evidence: Sequence[TakeEvidence], residuals: Residuals, floors
 
 
 def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
-    """Where the error is largest over a stretch of EVENT."""
+    """The event with the largest error: a stretch as long as EVENT."""
     k = e.channels.index(joint)
     r = residual[:, k] * e.sigma[k]
     n = max(1, round(EVENT / e.frame_time))

@@ -40,7 +40,7 @@ class Likelihood:
 
     @property
     def counts(self) -> Array:
-        """Of how many independent samples each frame is (n,), at most one."""
+        """Number of independent samples that each frame counts as (n,), at most one."""
         return np.asarray(np.minimum(self.span / (2.0 * self.tau), 1.0))
 
     @property
@@ -49,7 +49,7 @@ class Likelihood:
         return float(self.counts.sum())
 
     def scale(self, s: float) -> Array:
-        """Of the residuals (n,) [rad], at a discrepancy s."""
+        """Scale of the residuals (n,) [rad], at a discrepancy s."""
         return np.asarray(np.hypot(self.known, s))
 
     def log(self, r: Array, s: float) -> float:
@@ -65,7 +65,7 @@ class Likelihood:
         return np.asarray(np.copysign(np.sqrt(self.counts * (nu + 1) * np.log1p(np.square(r / self.scale(s)) / nu)), r))
 
     def slope(self, r: Array, s: float) -> Array:
-        """Of `rows` by r (n,)."""
+        """Derivative of `rows` by r (n,)."""
         nu, scale = self.tails, self.scale(s)
         z = np.maximum(np.abs(r / scale), 1e-6)
         return np.asarray(np.sqrt(self.counts * (nu + 1)) * z / (nu + z * z) / np.sqrt(np.log1p(z * z / nu)) / scale)

@@ -60,7 +60,7 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
 
 
 def _neutral(effect: Effect) -> tuple[float, ...]:
-    """Of the numbers of an effect that has options: what vanishes is nothing, what shapes is typical."""
+    """Initial numbers of an effect that has options: those that make the effect are zero, those that shape it are typical."""
     return tuple(p.typical if p.shapes else 0.0 for p in effect.parameters)
 
 
@@ -73,7 +73,7 @@ def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[
 
 
 def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:
-    """The same of a hypothesis as it stands, without a fit of it."""
+    """Every extension of a hypothesis as it stands, without a fit of it."""
     (r,) = yield [h]
     there = evaluate(region, options, h, r, (yield from slopes(options, h, r)))
     return there, (yield from linearise(region, options, there))

@@ -33,7 +33,8 @@ apart."""
 
 
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
-    """The same of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they drift.
+    """The uncertain numbers of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they
+    drift.
 
     Torque, friction and load friction are known much better together than one by one: their difference lifts an arm. Each
     number returned moves those after it, so that all are independent (Cholesky's factor of the covariance)."""
@@ -73,7 +74,7 @@ def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
 
 
 def changed_by(z: Mapping[Uncertain, float]) -> dict[tuple[str, str], float]:
-    """By joint and name, how far z standard deviations move each number: the logarithm of it, [rad] of ZERO."""
+    """How far z standard deviations move each number, by joint and name: as a logarithm, ZERO in [rad]."""
     out: dict[tuple[str, str], float] = {}
     for number, by in z.items():
         for name, each in number.changes.items():
@@ -99,7 +100,7 @@ def turned_horn(joint: str, angle: float) -> EffectSpec:
 
 
 def nominal_value(servo: ServoConstants, name: str) -> float:
-    """One of UNITS but ZERO, as the nominal law has it."""
+    """The nominal value of one of UNITS, ZERO apart."""
     return float(getattr(servo, name))
 
 

@@ -40,8 +40,8 @@ class Together:
 
 
 class _Blocks(NamedTuple):
-    """Of the information that one region brings. own (k, k): of its numbers, with their prior; mixed (k, m): of these and the
-    shared ones; shared (m, m): of the shared ones, less what its own numbers take (Schur complement); precision (n,): of each
+    """The information that one region brings, in blocks. own (k, k): of its numbers, with their prior; mixed (k, m): of these and
+    the shared ones; shared (m, m): of the shared ones, less what its own numbers take (Schur complement); precision (n,): of each
     frame [1/rad^2]."""
 
     own: Array
@@ -60,7 +60,7 @@ class Whole:
 
     @property
     def regions(self) -> tuple[Region, ...]:
-        """Of the robot."""
+        """The robot's regions."""
         return self.rollouts.regions
 
     def start(self, fits: Sequence[Fitted]) -> Together:
@@ -107,7 +107,7 @@ class Whole:
 
     def _move(self, at: Together, shared: Hypothesis, led: Sequence[tuple[Hypothesis, Array]], k: int, columns: Sequence[Array]
               ) -> Together:
-        """With one effect more, which does what `columns` say by its number k."""
+        """The regions with one more effect, which does what `columns` say by its number k."""
         fits = [evaluate(region, self.options, h, r, f.J) for region, f, (h, r) in zip(self.regions, at.fits, led)]
         own, slopes = shared.slices()[-1], []
         for G, column in zip(at.slopes, columns):
@@ -118,7 +118,7 @@ class Whole:
         return self.evaluate(shared, fits, slopes)
 
     def fit(self, at: Together) -> Together:
-        """All numbers fitted at once, with slopes by differences, those of the regions' own numbers measured once."""
+        """Fits all numbers at once, with slopes by differences; those of the regions' own numbers are measured once."""
         at = self._measure_slopes(at)
         at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], [f.r for f in at.fits])
         for _ in range(self.options.iterations):
@@ -133,7 +133,7 @@ class Whole:
         return at
 
     def _measure_slopes(self, at: Together) -> Together:
-        """With the slopes of the regions' own numbers measured where it stands: one number of each region at a time."""
+        """Measures the slopes of the regions' own numbers at the current parameters: one number of each region at a time."""
         each, stride = [f.hypothesis for f in at.fits], self.options.stride
         steps = [np.where(h.theta + stride <= h.bounds()[1], stride, -stride) for h in each]
         most = max(len(h.theta) for h in each)
@@ -146,7 +146,7 @@ class Whole:
         return self.evaluate(at.shared, fits, at.slopes)
 
     def _rolled_out(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> Together:
-        """Where it stands by rollouts, with slopes by the shared numbers measured there."""
+        """Evaluates the current parameters by rollouts, and measures the slopes of the shared numbers there."""
         _, high = shared.bounds()
         ways = np.where(shared.theta + self.options.stride <= high, self.options.stride, -self.options.stride)
         moved = self.rollouts.everywhere([(shared.at(shared.theta + m), each) for m in np.diag(ways)])

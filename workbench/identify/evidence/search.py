@@ -144,7 +144,8 @@ def _begin(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
 
 
 def _spread(h: Hypothesis, starts: int) -> list[Hypothesis]:
-    """Where a plain fit begins: as published, and elsewhere, a standard deviation of every number to one side or the other."""
+    """Starting points of a plain fit: as published, and others, in which every number is a standard deviation away to one side or
+    the other."""
     n = len(h.theta)
     signs = hadamard(1 << max(n, starts).bit_length())[1:starts, 1:n + 1]
     return [h, *(h.at(np.clip(h.theta + row, *h.bounds())) for row in signs)]
@@ -169,7 +170,7 @@ def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that predict most; those are fitted, and the beam polished."""
+    """Extends states, each by so many of the moves with the largest predicted gain; fits those, and polishes the beam."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     published: dict[Key, Move] = {}
@@ -194,8 +195,8 @@ def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], re
 
 
 def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
-    """Every effect alone, predicted around the nominal law as it stands; gains compared with a plain fit f. A plain fit adjusts
-    the law for want of the effect, and predicts its size badly."""
+    """Every effect alone, with its gain predicted around the nominal law as it stands; gains compared with a plain fit f. A plain
+    fit adjusts the law for want of the effect, and predicts its size badly."""
     h = start(region.numbers)
     if not len(h.theta):
         return []
@@ -252,12 +253,12 @@ def _refit(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _as_published(h: Hypothesis) -> Hypothesis:
-    """With none of the nominal law's numbers recalibrated."""
+    """The hypothesis with none of the nominal law's numbers recalibrated."""
     return h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
 
 
 def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) -> Found:
-    """With more fits, as far as they are of the same uncertain numbers."""
+    """The search's result with more fits, as far as they have the same uncertain numbers."""
     mine = [evaluate(found.region, options, f.hypothesis, f.r, f.J) for f in fits if f.hypothesis.numbers == found.region.numbers]
     return replace(found, fits=with_better(found.fits, mine))
 
@@ -284,7 +285,7 @@ def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candi
 
 
 def with_best(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
-    """With the best fit of each region as the hypothesis used for it."""
+    """The rollouts with the best fit of each region as its hypothesis."""
     return replace(rollouts, regions=tuple(f.region for f in found), standing=tuple(f.best.hypothesis for f in found))
 
 

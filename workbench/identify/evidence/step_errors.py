@@ -37,8 +37,8 @@ class StepErrors:
     _ideal: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def at(self, model: RobotModel, step: float, horizon: float = np.inf) -> Residuals:
-        """By take the error that a step, in steps of the search, adds to a model's residuals (N, c) [sigma]; 0 where unknown.
-        horizon [s]: of windows."""
+        """The error of each take that a step, in steps of the search, adds to a model's residuals (N, c) [sigma]; 0 where
+        unknown. horizon [s]: of windows."""
         key = (model.sha256, horizon)
         if (*key, step) not in self._known:
             steps = (step,) if key in self._ideal else (step, 2 * PROBLEM.fine, PROBLEM.fine)

@@ -38,13 +38,15 @@ class Ratio:
         return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
 
     def estimate(self, options: EvidenceOptions) -> Estimate:
-        """With its 90 % interval, as much wider than the fit claims as any number of a servo's law (`EvidenceOptions.formal`)."""
+        """The ratio with its 90 % interval, as much wider than the fit claims as any number of a servo's law
+        (`EvidenceOptions.formal`)."""
         half = CONCLUSIONS.z90 * options.formal * self.sd
         return Estimate(math.exp(self.log), math.exp(self.log - half), math.exp(self.log + half), "1")
 
 
 def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | None:
-    """Of a fit: the torque that it recalibrated, and its effects that do what torques do; None where no torque is uncertain."""
+    """The ratio of gravity to torque in a fit: the torque that it recalibrated, and its effects that act as torques do; None
+    where no torque is uncertain."""
     h = f.hypothesis
     scale = [k for k, n in enumerate(h.numbers) if n.name == SCALE]
     if not scale:

@@ -53,12 +53,12 @@ class TorqueLaw:
 
     @cached_property
     def group_of(self) -> tuple[str, ...]:
-        """Of each weight."""
+        """Group of each weight."""
         return tuple(f.group for f in self.functions for _ in range(f.values.shape[1]))
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """All that there could be, in order."""
+        """All possible groups, in order."""
         return tuple(dict.fromkeys(f.group for f in self.functions))
 
     @property
@@ -68,7 +68,7 @@ class TorqueLaw:
 
     @property
     def precision(self) -> Array:
-        """Of the prior of each active weight [1/(N m)^2]."""
+        """Precision of the prior of each active weight [1/(N m)^2]."""
         return np.array([self.scales[g] ** -2 for g in self.group_of if g in self.scales])
 
     @property
@@ -79,17 +79,17 @@ class TorqueLaw:
         return float(density - len(self.scales) * np.log(self.tried))
 
     def at(self, weights: Array, scales: Mapping[str, float] | None = None) -> TorqueLaw:
-        """With other weights (M,), and other groups."""
+        """The law with other weights (M,), and other groups."""
         scales = self.scales if scales is None else scales
         there = np.array([g in scales for g in self.group_of])
         return replace(self, weights=np.where(there, weights, 0.0), scales=dict(scales))
 
     def moved(self, k: int, by: float) -> TorqueLaw:
-        """With one weight more, whether or not its group is there [N m]."""
+        """The law with one weight changed by so much [N m], whether or not its group is active."""
         return replace(self, weights=self.weights + by * np.eye(len(self.weights))[k])
 
     def tables(self) -> tuple[TorqueTable, ...]:
-        """As a servo has it: one for each quantity that the torque depends on."""
+        """The law as a servo's tables: one for each quantity that the torque depends on."""
         return tuple(TorqueTable(f.depends_on, tuple(f.at.tolist()), tuple((f.values @ self.weights[own]).tolist()))
                      for f, own in self._present())
 

@@ -56,7 +56,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Predicted:
-    """Where linear algebra leads from a state. r (n,): predicted residuals; log_posterior [nats]."""
+    """The state that linear algebra predicts from another. r (n,): predicted residuals; log_posterior [nats]."""
 
     h: Hypothesis
     r: Array = field(repr=False)
@@ -117,8 +117,8 @@ def carried_on(found: Found, windows: Found, options: EvidenceOptions) -> Asks[F
 
 
 def _with(found: Found, made: Sequence[Fitted], options: EvidenceOptions) -> Found:
-    """With these fits, all judged by the correlation time of the closest ones' residuals; of each set of effects and groups the
-    likelier fit."""
+    """The result with these fits, all judged by the correlation time of the closest ones' residuals; the likelier fit of each set
+    of effects and groups is kept."""
     every = [*found.fits.values(), *(without_zero_groups(f) for f in made)]
     closest = sorted(every, key=lambda f: f.discrepancy)[:options.beam]
     alike = [f.r for f in closest if f.discrepancy < options.grown * closest[0].discrepancy]

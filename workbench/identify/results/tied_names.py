@@ -22,7 +22,7 @@ class TiedName:
     behind: float
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "behind": round(self.behind, 1),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()}, "evidence": self.sentence}
 
@@ -86,7 +86,7 @@ class GravityOverTorque:
         return f"{self.change} {causes_said} To find out, hang a known weight on the link in some takes (`load:`){more}."
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
                 "confidence": float(self.confidence), "torque_behind": round(self.torque_behind, 1),
                 "names": [n.to_json() for n in self.names], "evidence": self.in_words()}

@@ -47,9 +47,9 @@ def _log_config(config: SimulationConfig) -> SimulationConfig:
 
 def log_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
                questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
-    """Of each request on some takes the angles (M, c) [rad] at each log's `frames`; None where the compiled station does not know
-    the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one structure
-    play a log together."""
+    """The angles (M, c) [rad] of each request at each log's `frames`, on some takes; None where the compiled station does not
+    know the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one
+    structure play a log together."""
     held = {q.step: _log_config(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
     played = servo_angles([_jobs([evidence[i] for i in takes], q.model, held[q.step], q.horizon) for q, takes in questions])
     return [None if isinstance(angles, NotCoveredError) else

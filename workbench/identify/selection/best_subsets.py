@@ -35,7 +35,7 @@ class Response:
     points: Array
 
     def sizes(self, share: Array) -> Array:
-        """With these shares (k,) of the points, as far as they may go."""
+        """Sizes at these shares (k,) of the points, as far as bounds allow."""
         low, high = self._bounds
         return np.minimum(np.maximum(np.where(self.shapes, self.points[0], share @ self.points), low), high)
 
@@ -45,7 +45,7 @@ class Response:
 
     @cached_property
     def shapes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that only shape the effect; asked for in every set, as are its bounds."""
+        """Which sizes only shape the effect. Kept, as every set asks for it and for the bounds."""
         return self.trial.candidate.shapes
 
     @cached_property
@@ -170,7 +170,7 @@ def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes:
 
 
 def fitted_beside(search: Search, current: Fit, added: Sequence[CandidateFit], takes: tuple[int, ...], steps: int) -> Part[Fit]:
-    """All effects fitted together, when some were added."""
+    """Fits all effects together, after some were added."""
     return (yield from _fitted_from(search, [*current.sizes(), *((t.candidate, t.x) for t in added)], takes, steps))
 
 

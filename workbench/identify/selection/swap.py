@@ -138,7 +138,7 @@ def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], res
 
 
 def _bounds(seen: Response, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
-    """Of moves of those that stay, and of shares of the points at which the other was seen."""
+    """Bounds on moves of the effects that stay, and on shares of the points at which the other was seen."""
     low = [e.bounds()[0] - size for e, size in zip(staying, x)]
     high = [e.bounds()[1] - size for e, size in zip(staying, x)]
     if len(seen.points) == 1:

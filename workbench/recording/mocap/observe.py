@@ -85,7 +85,7 @@ def _model_poses(q: Array, p_WB: Array, quat_WB: Array, joints: tuple[str, ...],
 
 
 def _given_poses(seen: Take, take: Take, m: Measurement, model: RobotModel) -> dict[str, tuple[Array, Array]]:
-    """As `_model_poses`, from the take's links."""
+    """The same as `_model_poses`, from the poses of the take's links."""
     rest = _resting(take)
     out = {}
     for asset in m.pivots:

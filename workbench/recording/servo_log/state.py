@@ -36,7 +36,7 @@ def resolution(values: Array) -> float:
 
 
 def staying(values: Array) -> Array:
-    """Those of values (N,) that repeat in the next row: whole counts, even if the log interpolates between them on a clock of its
+    """Values of (N,) that repeat in the next row: whole counts, even if the log interpolates between them on a clock of its
     own."""
     values = values[np.isfinite(values)]
     return values[:-1][np.diff(values) == 0]
@@ -86,8 +86,9 @@ def _at(time: Array, values: Array, when: float) -> float:
 
 
 def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
-    """As logged, else the slope of the first positions where that exceeds their noise: a robot that is not seen to move
-    is at rest, and in one that is stuck in its friction an initial velocity error would move it permanently."""
+    """A joint's velocity [rad/s], as logged, else the slope of the first positions where that exceeds their noise: a robot that
+    is not seen to move is at rest, and in one that is stuck in its friction an initial velocity error would move it
+    permanently."""
     speed = recording.channels.get(f"velocity.{joint}")
     if speed is not None and np.isfinite(speed).any():
         return _at(recording.time, speed, time)

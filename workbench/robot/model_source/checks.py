@@ -108,8 +108,8 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
 
 @cached_by_content(maxsize=32)
 def link_sizes(path: Path) -> dict[str, float]:
-    """By link, the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones [m], at
-    least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
+    """Size of each link: the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones
+    [m], at least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
     plant, scene_graph, instances = _build(path, path)
     bodies = [plant.get_body(b) for instance in instances for b in plant.GetBodyIndices(instance)]
     out = {}

@@ -91,7 +91,7 @@ def _value(parent: Element, tag: str, text: str | None) -> None:
 
 
 def _inertial(out: Element, inertial: Element | None) -> None:
-    """As the URDF has it; SDF's own default would be 1 kg."""
+    """The inertial of a URDF link; a link without one gets no mass, as SDF's default would be 1 kg."""
     to = SubElement(out, "inertial")
     mass = None if inertial is None else inertial.find("mass")
     moments = None if inertial is None else inertial.find("inertia")

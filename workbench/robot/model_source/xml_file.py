@@ -73,7 +73,7 @@ _SIZES = ("size", "radius", "length")
 
 
 def _bound_prefix(content: bytes) -> bytes:
-    """With Drake's prefix bound, which Drake itself does not ask for."""
+    """The content with Drake's prefix bound, which Drake itself does not require."""
     if b"drake:" in content and b"xmlns:drake" not in content:
         for tag in (b"<sdf", b"<robot"):
             content = content.replace(tag, tag + f' xmlns:drake="{DRAKE}"'.encode(), 1)
