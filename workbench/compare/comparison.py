@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare import metrics
 from workbench.compare.footfalls import foot_phases, force_phases
@@ -14,7 +13,7 @@ from workbench.compare.results import NAN, Channel, Comparison, Pair, TakeCompar
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 __all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "align", "compare_takes", "noise_of"]
 
@@ -113,7 +112,7 @@ class _Takes:
         return Pair(of(self.recorded), simulated, floor, spread)
 
     @property
-    def use(self) -> NDArray[np.bool_]:
+    def use(self) -> Mask:
         """Frames after the first command."""
         return np.asarray(self.recorded.since_start >= 0)
 
@@ -167,7 +166,7 @@ def _heading_change(take: Take) -> float:
     return metrics.heading_change(take.quat_WB, take.since_start)
 
 
-def _walking(take: Take) -> NDArray[np.bool_]:
+def _walking(take: Take) -> Mask:
     end = np.inf if take.commands is None else take.commands.end
     return np.asarray((take.since_start >= 0) & (take.since_start <= end))
 

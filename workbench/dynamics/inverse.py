@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from workbench.dynamics.contact import share_forces
@@ -21,9 +20,9 @@ from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
-Stance = Mapping[str, NDArray[np.bool_]]
+Stance = Mapping[str, Mask]
 
 RECORDED_WINDOW, SIMULATED_WINDOW = 0.1, 0.02
 """Smoothing of takes [s]: the first turns 0.1 deg of noise at 120 Hz into about 2 rad/s², 0.013 N m of an AX-12's rotor; the
@@ -215,7 +214,7 @@ class InverseDynamics:
         full = replace(trajectory, joints=self.model.joints, q=q, v=v, a=a)
         return full, [f"{', '.join(missing)}: not given; held at zero"] if missing else []
 
-    def _angles(self, take: Take, rest: Mapping[str, float], problems: list[str]) -> tuple[Array, NDArray[np.bool_]]:
+    def _angles(self, take: Take, rest: Mapping[str, float], problems: list[str]) -> tuple[Array, Mask]:
         """Angles (N, n) [rad] of all joints, and which of them were seen (n,)."""
         self._check_joints(take.name, take.joints)
         q = self._columns(take.joints, take.q, np.nan)

@@ -34,7 +34,7 @@ from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel
 from workbench.types import Progress
 
-__all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
+__all__ = ["Certified", "CertifyOptions", "OtherEngine", "certify"]
 
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """A simulation, in words, and the function that runs it."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from workbench.files import InputError
@@ -27,7 +26,7 @@ from workbench.motion import Commands, PoseTable, load_motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 OtherEngine = Callable[[RobotModel, Commands, float], Take]
 """Plays commands for so many seconds on a robot, in an engine that shares no simulation code with this one."""
@@ -210,13 +209,13 @@ def _tilt(take: Take) -> Array:
     return np.asarray(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
 
 
-def _lasting(take: Take, inside: NDArray[np.bool_]) -> float:
+def _lasting(take: Take, inside: Mask) -> float:
     """Largest joint torque that lasts 10 ms [N m]."""
     assert take.torque is not None
     every = float(np.median(np.diff(take.time)))
     return float(minimum_filter1d(np.abs(take.torque[inside]), max(1, round(0.01 / every)), axis=0).max())
 
 
-def _jerk(take: Take, inside: NDArray[np.bool_]) -> float:
+def _jerk(take: Take, inside: Mask) -> float:
     assert take.p_WB is not None
     return base_jerk(take.time[inside], take.p_WB[inside])

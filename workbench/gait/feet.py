@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
 from workbench.recording import quaternions
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 TOUCHING = 1e-3
 """Height of a foot's lowest point [m], above that at rest, below which it carries load: there points of 1e4 N/m yield by 0.3 mm,
@@ -67,7 +66,7 @@ def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array
     return height, speed
 
 
-def _floor(z: Array, resting: NDArray[np.bool_]) -> Array:
+def _floor(z: Array, resting: Mask) -> Array:
     """Height at which each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
     return np.asarray(np.median(z[resting], axis=0) if resting.any() else z.min(axis=0))
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.planned import table_shape, tasks_of
-from workbench.gait.search import Found, Progress, keeps_all_but_speed, steer
+from workbench.gait.search import Found, keeps_all_but_speed, steer
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import space_of
 from workbench.gait.trajopt import Planned, plan
+from workbench.types import Progress
 
 Offsets = tuple[tuple[float, ...], ...]
 

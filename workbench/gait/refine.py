@@ -15,10 +15,11 @@ from workbench.gait.limits import clearance_margin, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.requirements import SLOWEST, drift
-from workbench.gait.search import Found, Progress
+from workbench.gait.search import Found
 from workbench.gait.shape import FAMILIES, GaitShape
 from workbench.gait.table import paths_of
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 FAMILIES = MappingProxyType({
     "trot": (0.0, 0.5, 0.5, 0.0), "walk": (0.0, 0.5, 0.75, 0.25), "crawl": (0.0, 0.5, 0.75, 0.25), "bound": (0.0, 0.0, 0.5, 0.5),
@@ -86,7 +85,7 @@ class FootPath:
     """What feet should do at N phases. p: (N, F, 3) [m] of the feet's tips in the base link's frame. stance: (N, F) bool."""
 
     p: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
 
 
 def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: Array | float = 1.0) -> FootPath:

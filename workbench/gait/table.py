@@ -12,7 +12,7 @@ from workbench.files import InputError
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 WAYS = (600, 150)
 """Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.6 s are 1.2 rad/s, a fifth of
@@ -70,7 +70,7 @@ class Paths:
     small: Array
     stand: Array
     off: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
 
 
 def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
@@ -82,7 +82,7 @@ def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
     return [_paths(shape, every, off, stances) for shape, (every, off, stances) in zip(shapes, machine.angles_of(wanted))]
 
 
-def _paths(shape: GaitShape, every: Array, off: Array, stances: NDArray[np.bool_]) -> Paths:
+def _paths(shape: GaitShape, every: Array, off: Array, stances: Mask) -> Paths:
     """The paths of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for
     offsets of another number of poses or joints."""
     P, extra = shape.poses, np.array(shape.offsets)

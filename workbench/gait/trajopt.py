@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
 from pydrake.solvers import IpoptSolver, MathematicalProgram, SnoptSolver, SolverOptions
 
@@ -20,7 +19,7 @@ from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape, foot_path
 from workbench.robot import GRAVITY
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 KNOTS = 16
 TORQUE_SHARE = 0.8
@@ -55,7 +54,7 @@ class Planned:
     solver: str
     seconds: float
     q: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
     forces: Array
     p: Array
     tilt: Array

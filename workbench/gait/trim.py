@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, Certificate, read_certificate
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
@@ -27,6 +27,7 @@ from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.quaternions import matrix
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 SEED = 2_000_000
 """Of the trimmed motion's robots, apart from those of searches and certificates."""

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
 from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 Key = tuple[str, tuple[str, ...]]
 """Name and place of an effect."""
@@ -83,12 +82,12 @@ class Candidate:
         return self.fixed.count(False)
 
     @property
-    def shapes(self) -> NDArray[np.bool_]:
+    def shapes(self) -> Mask:
         """Which sizes belong to numbers that only shape the effect."""
         return np.array([p.shapes for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     @property
-    def of_vector(self) -> NDArray[np.bool_]:
+    def of_vector(self) -> Mask:
         """Which sizes are components of a vector."""
         return np.array([p.vector for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
@@ -163,7 +162,7 @@ class Candidate:
         return probes if len(probes) < 2 else both_ways(np.zeros(self.size), probes)
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
+    def makes(self) -> Mask:
         """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 

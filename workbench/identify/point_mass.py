@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, both_ways
 from workbench.robot.kinematics import Kinematics
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:
@@ -57,7 +56,7 @@ class PointMass(Candidate):
         return [middle, *both_ways(middle, [p - middle for p in probes])]
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
+    def makes(self) -> Mask:
         """Which sizes make the effect: where all are 0, it is not there."""
         return np.arange(self.size) == 0
 
@@ -75,17 +74,17 @@ class SwungMass(PointMass):
         return 3
 
     @property
-    def shapes(self) -> NDArray[np.bool_]:
+    def shapes(self) -> Mask:
         """Which sizes only shape the effect."""
         return np.array([True, False, False])
 
     @property
-    def of_vector(self) -> NDArray[np.bool_]:
+    def of_vector(self) -> Mask:
         """Which sizes are components of a vector."""
         return ~self.shapes
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
+    def makes(self) -> Mask:
         """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 

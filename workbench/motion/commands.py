@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Commands:
     joints: tuple[str, ...]
     goals: Array
     speeds: Array
-    enabled: NDArray[np.bool_]
+    enabled: Mask
     end: float
     poses: NDArray[np.int_]
     begun: bool = False

@@ -21,7 +21,7 @@ from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT
 from workbench.robot.mounting import Mounting
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class MtnFile:
 
     source: str
     version: str
-    enable: NDArray[np.bool_]
+    enable: Mask
     motor_type: NDArray[np.int64]
     pages: tuple[MtnPage, ...]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
+from workbench.types import Progress
 from workbench.view.figures import body_attitude, body_path, by_joint, film_strip, footfalls, joint_grid, joint_torques, stance_of
 from workbench.view.report.comparison import headline, take_section
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
@@ -65,7 +66,7 @@ class Demo:
     comparison: Comparison
 
 
-def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Demo:
+def run_demo(folder: Path, progress: Progress) -> Demo:
     """Simulates, compares, exports and writes everything into `folder`; progress: called with the stage and the share done."""
     began = time.monotonic()
     model = puppy_model()
@@ -98,7 +99,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     return Demo(_as_text(rows), headline(comparison), diagnosed.said, report.write(folder / "report.html"), comparison)
 
 
-def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:
+def _walks(model: RobotModel, motion: Motion, progress: Progress) -> dict[str, Take]:
     """The four runs by label, beginning with the servo law in point contact."""
     labels = [f"{DRIVES[drive]}, {contact}" for drive, contact in RUNS]
     configs = [SimulationConfig(drive=drive, contact=contact, engine="drake") for drive, contact in RUNS]

@@ -14,6 +14,7 @@ from workbench.device.capture.link import Link
 from workbench.device.capture.packets import HIRES, OLDEST, BodyPose, BrokenPacketError, Message, ServerInfo, kind_of, packet
 from workbench.device.capture.stream import Counts, Stream
 from workbench.files import InputError
+from workbench.types import Progress
 
 RESTARTED = 10
 """Frames in a row that are of another stream: then Motive was restarted or plays back."""
@@ -112,7 +113,7 @@ class Recorder:
         """Ends Motive's own recording."""
         return self._command("StopRecording")
 
-    def listen(self, journal: Journal, until: Callable[[], bool], progress: Callable[[str, float | None], None] | None = None,
+    def listen(self, journal: Journal, until: Callable[[], bool], progress: Progress | None = None,
                seconds: float | None = None) -> Counts:
         """Records until `until()`, or so many seconds after the first frame; InputError where no frame comes at all.
 

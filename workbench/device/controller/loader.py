@@ -9,6 +9,7 @@ from typing import Protocol
 
 from workbench.device.controller.loader_profile import LoaderProfile
 from workbench.device.link import FrameReader, FrameType, StateMessage, frame, message
+from workbench.types import Progress, no_progress
 
 FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that back: RoboPlus Manager, 'Controller Firmware "
            "Management' (R+ Manager on newer systems), with the controller on USB; the loader itself cannot be overwritten.")
@@ -80,7 +81,7 @@ class Loading:
     """One conversation: `run` has the image loaded and started, or raises LoadError. Progress hears (what, done)."""
 
     def __init__(self, line: Line, profile: LoaderProfile, transcript: Transcript,
-                 progress: Callable[[str, float | None], None] = lambda what, done: None) -> None:
+                 progress: Progress = no_progress) -> None:
         self._line, self._profile, self._transcript, self._progress = line, profile, transcript, progress
         self._state = UNTOUCHED
 

@@ -26,6 +26,7 @@ from workbench.device.link import (
 from workbench.device.tables.table_file import TableFile, encode_table
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
+from workbench.types import Progress
 
 ANSWER = 1.5
 """Until an order is answered, and a table of 4 kB checked [s]: the upload itself takes 0.7 s at 57,600 bit/s."""
@@ -146,7 +147,7 @@ class Controller:
             raise BusError("it was commanded to play, and does not" + why)
         return began.time
 
-    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
+    def play(self, seconds: float, progress: Progress) -> tuple[float, str]:
         """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
         began = self.start()
         end = self.now() + seconds
@@ -221,7 +222,7 @@ class Controller:
 
 
 def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, profile: ServoProfile, stop: Callable[[], str],
-                       progress: Callable[[str, float | None], None] | None = None) -> ControllerRun:
+                       progress: Progress | None = None) -> ControllerRun:
     """Upload, neutral, play, release, and the joint log of it. seconds: how long the table plays with its cycles.
 
     BusError in one line where the controller is not there, refuses the table, does not get to neutral, or was stopped before it
@@ -249,7 +250,7 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
 
 
 def _perform(controller: Controller, table: TableFile, seconds: float,
-             tell: Callable[[str, float | None], None]) -> tuple[float | None, str]:
+             tell: Progress) -> tuple[float | None, str]:
     """Upload, neutral, play, neutral. The table goes first: one that is refused moves nothing. When it began (None: it did not),
     and why it ended early."""
     began, stopped = None, ""

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from workbench.compare.metrics import heading
@@ -16,7 +15,7 @@ from workbench.gait.drive.family import STRAIGHT, Steer
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.walk import Seen, StoppedError, Walk
 from workbench.recording.take import Take
-from workbench.types import Array, Progress
+from workbench.types import Array, Mask, Progress
 
 Watch = Callable[[Seen, Array], None]
 """Called at the end of each cycle with the robot's pose and the planned positions (N, 2) [m]."""
@@ -47,7 +46,7 @@ class Driven:
     take: Take
 
     @property
-    def settled(self) -> NDArray[np.bool_]:
+    def settled(self) -> Mask:
         """Cycles whose errors are judged."""
         return np.asarray(self.along >= min(SETTLED, self.path.length / 2))
 

@@ -9,13 +9,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import t as student_t
 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.torque_law import TorqueLaw
@@ -140,8 +139,8 @@ class Prior:
 
     center: Array
     scale: Array
-    normal: NDArray[np.bool_]
-    one_sided: NDArray[np.bool_]
+    normal: Mask
+    one_sided: Mask
     freedom: Array
 
     @classmethod

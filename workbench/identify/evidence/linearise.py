@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
 from workbench.identify.evidence.fit import Asks, Fitted, evaluate, slopes
@@ -16,7 +15,7 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 """Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
@@ -138,7 +137,7 @@ def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move)
     return _judged(region, options, f, *led_after(region, options, f, h, r, J, led), (*a.added, two))
 
 
-def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
+def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, Mask]:
     """The fit's slopes in the order of another hypothesis' numbers, 0 of those that it lacks, and which it has."""
     column = dict(zip(f.hypothesis.labels, f.J.T))
     known = np.array([label in column for label in h.labels])
@@ -201,7 +200,7 @@ def _best_along(region: Region, options: EvidenceOptions, f: Fitted, along: Sequ
     return _judged(region, options, f, *best, (c,))
 
 
-def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis, Array, Array, NDArray[np.bool_]]:
+def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis, Array, Array, Mask]:
     """A candidate at sizes x that leave r: with that, slopes, and which numbers may be led after it."""
     h = f.hypothesis.with_effect(c, x)
     J, led = slopes_for(f, h)
@@ -213,7 +212,7 @@ def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis
     return h, r, J, led
 
 
-def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
+def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: Mask
               ) -> tuple[Hypothesis, Array, Array]:
     """A hypothesis whose other parameters are re-optimised linearly, its residuals, and slopes."""
     prior = Prior.of(h, options)

@@ -13,14 +13,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.options import LawOptions
 from workbench.identify.rollouts.servo_logs import frames
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo import Instant, ServoLaw
 from workbench.servo.tabled import Tabled
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
@@ -62,7 +61,7 @@ class TorqueLaw:
         return tuple(dict.fromkeys(f.group for f in self.functions))
 
     @property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Mask:
         """Which weights are of groups that are there (M,)."""
         return np.array([g in self.scales for g in self.group_of])
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import (
     Asks,
@@ -31,7 +30,7 @@ from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.search import Found
 from workbench.identify.evidence.torque_law import TorqueLaw
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
@@ -223,7 +222,7 @@ def _measure_slopes(options: EvidenceOptions, at: _State) -> Asks[_State]:
     return _State(at.h, at.r, J, B)
 
 
-def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]) -> Asks[Array]:
+def _by_weights(h: Hypothesis, r: Array, weight: float, which: Mask) -> Asks[Array]:
     """Slopes (n, M) of r by some of the law's weights, from differences of `weight` [N m]; 0 of others."""
     assert h.law is not None
     B = np.zeros((len(r), len(h.law.weights)))

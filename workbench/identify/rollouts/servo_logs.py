@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.robot import RobotModel
@@ -17,7 +16,7 @@ from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
@@ -34,7 +33,7 @@ def is_log(e: TakeEvidence) -> bool:
     return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints
 
 
-def frames(e: TakeEvidence) -> NDArray[np.bool_]:
+def frames(e: TakeEvidence) -> Mask:
     """Frames of a log that are looked at."""
     return np.asarray((e.since >= 0) & (e.since <= e.until))
 

@@ -13,7 +13,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit, Sizes
@@ -23,7 +22,7 @@ from workbench.identify.options import FIT
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS
 from workbench.identify.selection.record import SelectionStep
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Response:
         return self._inverse @ x[~self.shapes]
 
     @cached_property
-    def shapes(self) -> NDArray[np.bool_]:
+    def shapes(self) -> Mask:
         """Which sizes only shape the effect. Kept, as every set asks for it and for the bounds."""
         return self.trial.candidate.shapes
 
@@ -81,7 +80,7 @@ def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tupl
     return None
 
 
-def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> NDArray[np.bool_]:
+def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> Mask:
     """The entries of the vector of the channels of `judged` (None: of every channel) that belong to a joint."""
     inside = {}
     for i in takes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
@@ -14,7 +13,7 @@ from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, t
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array) -> tuple[Take, dict[str, BodyTrack]]:
@@ -53,7 +52,7 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
                     for a, b in bodies.items()}
 
 
-def _resting(take: Take) -> NDArray[np.bool_]:
+def _resting(take: Take) -> Mask:
     """Frames before the first command, or the first instant."""
     return take.resting if take.resting.any() else np.arange(len(take)) == 0
 
