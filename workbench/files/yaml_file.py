@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +135,10 @@ class Fields:
         """The error to raise about `key`."""
         return InputError(self.path, f"{self.at(key)}: {expected}")
 
+    def missing(self, keys: Sequence[str]) -> InputError:
+        """The error to raise about required keys that are absent."""
+        return self.error(", ".join(keys), "is missing" if len(keys) == 1 else "are missing")
+
     def at(self, key: str) -> str:
         """Place of a key in the file."""
         return f"{self.place}.{key}" if self.place else key
@@ -209,6 +213,14 @@ class Fields:
             if not isinstance(key, str):
                 raise self.error(str(key), "expected a name as key")
             yield key, self.raw(key)
+
+    def numbered(self) -> dict[int, Any]:
+        """Takes all keys that are left, with their values, for mappings whose keys are whole numbers of at least 0."""
+        for key in self._left:
+            if isinstance(key, bool) or not isinstance(key, int) or key < 0:
+                raise self.error(str(key), "expected a whole number as key")
+        out, self._left = self._left, {}
+        return out
 
     def sequence(self, key: str) -> list[Fields]:
         """A list of mappings; empty where the key is absent."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.files.errors import UnknownFolderError
+from workbench.files.listing import list_names
 from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
@@ -375,8 +376,7 @@ def _finite(value: float) -> float | None:
 
 
 def _names(names: tuple[str, ...] | list[Any]) -> str:
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return f"{len(names)}: {' '.join(map(str, names[:_LISTED]))}{more}" if names else ""
+    return f"{len(names)}: {list_names(list(map(str, names)), _LISTED, ' ')}" if names else ""
 
 
 def _line(text: str) -> str:

@@ -133,7 +133,8 @@ def _finish(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Foun
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fit_hypothesis(region, options, best.hypothesis, s, options.iterations, r)
     fit = yield from regress(region, options, fit)
-    fit = replace(fit, beside=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit = replace(fit, law_slopes=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence,
+                  log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

@@ -132,7 +132,7 @@ class Explanation:
         out = []
         for region, p in zip(self.rollouts.regions, self.posteriors):
             law = p.best.hypothesis.law
-            if law is None or p.best.beside is None:
+            if law is None or p.best.law_slopes is None:
                 continue
             spread = law.spread(CONCLUSIONS.wider**2 * weights_covariance(p.best, region, self.options))
             fit, validation = (change(evidence, (law.joint,), before, after, use) for use in ("fit", "validate"))

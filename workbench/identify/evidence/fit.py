@@ -26,8 +26,8 @@ Asks = Generator[list[Hypothesis], list[Array], T]
 @dataclass(frozen=True)
 class Fitted:
     """r (n,): residuals [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of the set of
-    effects; too_much (k, k): apparent information in J that is only noise of J, where that is known; beside (n, m): of r by the
-    weights of an unnamed torque, where it has one."""
+    effects; noise_information (k, k): apparent information in J that is only noise of J, where that is known; law_slopes (n, m):
+    of r by the weights of an unnamed torque, where it has one."""
 
     hypothesis: Hypothesis
     r: Array = field(repr=False)
@@ -35,8 +35,8 @@ class Fitted:
     discrepancy: float
     log_evidence: float
     log_prior: float
-    too_much: Array | None = field(default=None, repr=False)
-    beside: Array | None = field(default=None, repr=False)
+    noise_information: Array | None = field(default=None, repr=False)
+    law_slopes: Array | None = field(default=None, repr=False)
 
     @property
     def log_posterior(self) -> float:
@@ -47,13 +47,13 @@ class Fitted:
         """Covariance of theta (k, k)."""
         h, likelihood = self.hypothesis, region.likelihood
         H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
-        if self.too_much is not None:
-            eigenvalues, axes = np.linalg.eigh(H - self.too_much)
+        if self.noise_information is not None:
+            eigenvalues, axes = np.linalg.eigh(H - self.noise_information)
             H = (axes * np.maximum(eigenvalues, 0.0)) @ axes.T
         H = H + np.diag(Prior.of(h, options).precision(h.theta))
-        if self.beside is not None and h.law is not None:  # what the weights could take over is not known
-            W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.beside
-            taken = np.linalg.solve(self.beside.T @ W + np.diag(h.law.precision), W.T @ self.J)
+        if self.law_slopes is not None and h.law is not None:  # what the weights could take over is not known
+            W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.law_slopes
+            taken = np.linalg.solve(self.law_slopes.T @ W + np.diag(h.law.precision), W.T @ self.J)
             H = _at_least(H - (self.J.T @ W) @ taken, Prior.of(h, options).precision(h.theta))
         return np.asarray(np.linalg.inv(H))
 
@@ -69,8 +69,8 @@ def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key,
 def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> Array:
     """Covariance of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
     assert f.hypothesis.law is not None
-    assert f.beside is not None
-    A = np.hstack([f.J, f.beside])
+    assert f.law_slopes is not None
+    A = np.hstack([f.J, f.law_slopes])
     P = np.concatenate([Prior.of(f.hypothesis, options).precision(f.hypothesis.theta), f.hypothesis.law.precision])
     H = (A.T * region.likelihood.precision(f.r, f.discrepancy)) @ A + np.diag(P)
     return np.asarray(np.linalg.inv(H)[f.J.shape[1]:, f.J.shape[1]:])
@@ -83,17 +83,18 @@ def _at_least(H: Array, prior: Array) -> Array:
     return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(eigenvalues, 1.0)) @ axes.T))
 
 
-def evaluate(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:
-    """A hypothesis with its evidence, where it stands. beside (n, m): slopes by the weights of its unnamed torque."""
+def evaluate(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, law_slopes: Array | None = None
+             ) -> Fitted:
+    """A hypothesis with its evidence at its own parameters. law_slopes (n, m): slopes by the weights of its unnamed torque."""
     prior = Prior.of(h, options)
     density, precision, slopes = prior.log(h.theta), prior.precision(h.theta), J
     parts = len(h.effects) + sum(len(c.options) for c in h.effects)
-    if h.law is not None and beside is not None:
+    if h.law is not None and law_slopes is not None:
         density, precision = density + h.law.log_prior, np.concatenate([precision, h.law.precision])
-        slopes, parts = np.hstack([J, beside]), parts + len(h.law.scales)
+        slopes, parts = np.hstack([J, law_slopes]), parts + len(h.law.scales)
     log, s = region.likelihood.evidence(r, slopes, density, precision)
     odds = parts * log_odds(len(region.candidates), options.expected)
-    return Fitted(h, r, J, s, log, odds, beside=beside)
+    return Fitted(h, r, J, s, log, odds, law_slopes=law_slopes)
 
 
 def fit_hypothesis(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
@@ -156,7 +157,7 @@ def regress(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]
     for pair in h.alike():
         J[:, pair] = _of_rank_one(J[:, pair], precision)
     scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
-    return replace(f, J=J, too_much=float(precision @ chance) * scatter)
+    return replace(f, J=J, noise_information=float(precision @ chance) * scatter)
 
 
 def _of_rank_one(J: Array, precision: Array) -> Array:

@@ -122,7 +122,7 @@ def _with(found: Found, made: Sequence[Fitted], options: EvidenceOptions) -> Fou
     closest = sorted(every, key=lambda f: f.discrepancy)[:options.beam]
     alike = [f.r for f in closest if f.discrepancy < options.grown * closest[0].discrepancy]
     region = found.region.with_correlation_time(float(np.median([found.region.correlation(r) for r in alike])))
-    fits = [evaluate(region, options, f.hypothesis, f.r, f.J, f.beside) for f in every]
+    fits = [evaluate(region, options, f.hypothesis, f.r, f.J, f.law_slopes) for f in every]
     return replace(found, region=region, fits=with_better({}, fits))
 
 
@@ -130,14 +130,15 @@ def without_zero_groups(f: Fitted) -> Fitted:
     """A fit without the groups of its law whose weights are all zero, which remain where no step from zero was an improvement;
     without a law if that is all of them."""
     law = f.hypothesis.law
-    if law is None or f.beside is None:
+    if law is None or f.law_slopes is None:
         return f
     used = {g for g, w in zip(law.group_of, law.weights) if w}
     if used == set(law.scales):
         return f
     kept = law.at(law.weights, {g: s for g, s in law.scales.items() if g in used})
     columns = np.isin(np.array(law.group_of)[law.active], list(used))
-    return replace(f, hypothesis=replace(f.hypothesis, law=kept if used else None), beside=f.beside[:, columns] if used else None)
+    return replace(f, hypothesis=replace(f.hypothesis, law=kept if used else None),
+                   law_slopes=f.law_slopes[:, columns] if used else None)
 
 
 def _follow(region: Region, options: EvidenceOptions, at: _State) -> Asks[list[Fitted]]:
