@@ -69,8 +69,9 @@ def smooth(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB:
     n = q.shape[1]
     joint, place, turn = (_columns(parts, which) for which in (slice(n), slice(n, n + 3), slice(n + 3, n + 7)))
     u, omega, alpha = angular_motion(turn.value, turn.first, turn.second)
-    trajectory = RobotTrajectory(time, joints, joint.value, joint.first, joint.second, place.value, u,
-                            np.column_stack([omega, place.first]), np.column_stack([alpha, place.second]))
+    trajectory = RobotTrajectory(
+        time, joints, joint.value, joint.first, joint.second, place.value, u, np.column_stack([omega, place.first]),
+        np.column_stack([alpha, place.second]))
     rotation = float(2 * np.sqrt(np.sum(turn.noise**2) / 3))  # a turn by d moves a quaternion by d/2; three directions of four
     return trajectory, Noise(joint.noise, place.noise, rotation)
 

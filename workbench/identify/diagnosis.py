@@ -12,7 +12,7 @@ from pathlib import Path
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
-from workbench.compare.logged import how_logged
+from workbench.compare.logged import describe_logging
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
@@ -172,7 +172,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at) | how_logged([e.take for e in evidence])
+        | subset_used(found.looked_at) | describe_logging([e.take for e in evidence])
         | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)

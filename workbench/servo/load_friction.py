@@ -1,4 +1,4 @@
-"""Dry friction that grows with the load of the gear, of the nominal law and of effects."""
+"""Dry friction that grows with the gear's load, in the nominal law and in effects."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.servo.terms import Instant, ServoTerm, TermNumbers
 from workbench.types import Array
 
 MOST_LOAD = 2.0
-"""Of the torque at full duty: beyond it friction grows no further, as the solver needs a bound."""
+"""Load, as a share of the torque at full duty, beyond which friction grows no further: the solver needs a bound."""
 
 
 @dataclass(frozen=True)

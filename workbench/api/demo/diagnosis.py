@@ -26,10 +26,10 @@ _MORE = (
 
 @dataclass(frozen=True)
 class Found:
-    """section: of the demo's page. said: verdict and findings in a sentence."""
+    """The diagnosis in the demo: its section of the page, and its verdict in a sentence."""
 
     section: Section
-    said: str
+    headline: str
 
 
 def diagnosis_section(folder: Path, progress: Progress) -> Found:

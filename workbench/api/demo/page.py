@@ -85,7 +85,7 @@ def run_demo(folder: Path, progress: Progress) -> Demo:
     lengths = [_end(take)[0] for take in takes.values()]
     report = Report(
         "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and "
-        f"contact. The bundled arm: {diagnosed.said}",
+        f"contact. The bundled arm: {diagnosed.headline}",
         _SUMMARY, [(label, f"{_end(t)[0]:.1f} cm", f"heading {_heading(t):+.1f}°") for label, t in takes.items()],
         Provenance.of(model, seconds=time.monotonic() - began))
     report.add(_walk_section(rows, takes, model, folder))
@@ -96,7 +96,7 @@ def run_demo(folder: Path, progress: Progress) -> Demo:
     report.add(_firmware_section(motion, folder / "firmware", violations))
     report.add(gait_section(folder / "gait", model, progress))
     progress("drawing the report", None)
-    return Demo(_as_text(rows), headline(comparison), diagnosed.said, report.write(folder / "report.html"), comparison)
+    return Demo(_as_text(rows), headline(comparison), diagnosed.headline, report.write(folder / "report.html"), comparison)
 
 
 def _walks(model: RobotModel, motion: Motion, progress: Progress) -> dict[str, Take]:

@@ -164,7 +164,7 @@ def _describe_servo(bus: Bus, servo: int, number: int, joint: str | None, mounti
     try:
         registers = read_registers(bus, servo)
     except NoAnswerError as e:
-        raise BusError(f"answered once, then not any more: {e.said}", servo, joint) from None
+        raise BusError(f"answered once, then not any more: {e.cause}", servo, joint) from None
     angle = JointServo(bus.profile, mounting).angle(registers["present_position"])
     return FoundServo(servo, joint, number, name, registers, angle, registers["present_voltage"] / 10,
                       registers["present_temperature"], bus.alarms.get(servo, ()), mounting)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from workbench.device.controller.loader_profile import LoaderProfile
-from workbench.device.link import FrameReader, FrameType, StateMessage, frame, message
+from workbench.device.link import FrameReader, FrameType, StateMessage, decode_message, encode_frame
 from workbench.types import Progress, no_progress
 
 FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that back: RoboPlus Manager, 'Controller Firmware "
@@ -195,7 +195,7 @@ class Loading:
         self._fresh_prompt()
         self._write(profile.start + profile.line_end)
         for again in (False, True):
-            found = self._first_word(b"" if not again else frame(FrameType.ASK))
+            found = self._first_word(b"" if not again else encode_frame(FrameType.ASK))
             if found is not None:
                 return found
             self._reopen()
@@ -207,7 +207,7 @@ class Loading:
             if ask:
                 self._write(ask)
             for got in reader.feed(self._read(0.1)):
-                content = message(got)
+                content = decode_message(got)
                 if isinstance(content, StateMessage):
                     return content
             waited += 0.1

@@ -18,9 +18,9 @@ from workbench.device.link import (
     LogMessage,
     Message,
     StateMessage,
-    frame,
+    decode_message,
+    encode_frame,
     log_bytes,
-    message,
     upload_frames,
 )
 from workbench.device.tables.table_file import TableFile, encode_table
@@ -94,7 +94,7 @@ class Controller:
     def state(self) -> StateMessage:
         """The controller's present state; BusError where nothing answers in its frames."""
         for _ in range(3):
-            self._send(frame(FrameType.ASK))
+            self._send(encode_frame(FrameType.ASK))
             found = self._wait(lambda m: isinstance(m, StateMessage), 0.5)
             if isinstance(found, StateMessage):
                 return found
@@ -106,7 +106,7 @@ class Controller:
         if state.state == ControllerState.PLAY:
             raise BusError("the robot plays; stop it first (1 on the remote, or START)")
         if state.state in (ControllerState.STILL, ControllerState.LIMP):
-            self._send(frame(FrameType.PLAY))
+            self._send(encode_frame(FrameType.PLAY))
         end = self.now() + TO_NEUTRAL
         while state.state != ControllerState.NEUTRAL:
             state = self._next_state(state, end)
@@ -120,7 +120,7 @@ class Controller:
             found = self._wait(lambda m: isinstance(m, StateMessage), min(1.0, end - self.now()))
             if isinstance(found, StateMessage):
                 return found
-            self._send(frame(FrameType.ASK))
+            self._send(encode_frame(FrameType.ASK))
         raise BusError(f"it did not come to neutral in {TO_NEUTRAL:g} s; it is at {state.state.name}: {state.reason}")
 
     def upload(self, table: TableFile) -> None:
@@ -138,7 +138,7 @@ class Controller:
     def start(self) -> float:
         """Has it play from neutral; returns when it began on its own clock [s]. BusError with its reason where it does not."""
         self._wait(lambda m: False, REST)
-        self._send(frame(FrameType.PLAY))
+        self._send(encode_frame(FrameType.PLAY))
         began = self._wait(_on_the_way, ANSWER)
         if isinstance(began, StateMessage) and began.state == ControllerState.RAMP:  # the first pose is too far for its speed
             began = self._wait(_plays_or_gave_up, TO_NEUTRAL)
@@ -166,7 +166,7 @@ class Controller:
         """Sends a stop if it moves, and waits until it reaches neutral; returns "", or the reason why it did not."""
         end, state = self.now() + TO_NEUTRAL, self.state()
         if state.state in (ControllerState.CHECK, ControllerState.RAMP, ControllerState.PLAY):
-            self._send(frame(FrameType.STOP))
+            self._send(encode_frame(FrameType.STOP))
         while state.state not in (ControllerState.NEUTRAL, ControllerState.LIMP, ControllerState.STILL):
             state = self._next_state(state, end)
         return "" if state.state == ControllerState.NEUTRAL else _reason(state)
@@ -175,7 +175,7 @@ class Controller:
         """Torque off, whatever it is at and whatever is asked meanwhile; whether it said so."""
         self._stop = lambda: ""
         for _ in range(3):
-            self._send(frame(FrameType.RELEASE))
+            self._send(encode_frame(FrameType.RELEASE))
             if self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.LIMP, 0.5) is not None:
                 return True
         return False
@@ -212,7 +212,7 @@ class Controller:
                 self._port.pause(0.001)
             hit = None
             for got in self._reader.feed(data):
-                content = message(got)
+                content = decode_message(got)
                 if content is not None:
                     self.heard.append((self.now(), content))
                     hit = hit or (content if wanted(content) else None)

@@ -84,7 +84,7 @@ class _Performance:
         except BaseException as e:
             rig.journal.write(t=_time(bus), stopped=str(e) or type(e).__name__)
             if self._energised and not self._let_go() and isinstance(e, BusError):
-                raise type(e)(f"{e.said}; {HOLDING}", e.servo, e.joint, e.register) from None
+                raise type(e)(f"{e.cause}; {HOLDING}", e.servo, e.joint, e.register) from None
             raise
         finally:
             bus.options = kept
