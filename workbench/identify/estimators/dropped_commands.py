@@ -147,7 +147,8 @@ def stands_at_an_end(evidence: Sequence[TakeEvidence], joint: str, lost: Mapping
             stood = float(np.median(last[np.isfinite(last)]))
             way = 1.0 if goal > stood else -1.0
             if way not in ends:
-                ends[way] = max(float(np.nanquantile(way * _observed_angle(e, joint), 0.995)) for e in evidence if joint in e.joints)
+                went = (way * _observed_angle(e, joint) for e in evidence if joint in e.joints)
+                ends[way] = max(float(np.nanquantile(angle, 0.995)) for angle in went)
             if not (way * goal > ends[way] and way * stood > ends[way] - READ_OFF.at_stop):
                 return False
     return True
@@ -158,7 +159,7 @@ def _observed_angle(e: TakeEvidence, joint: str) -> Array:
     return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
 
-def _at_the_end(e: TakeEvidence) -> list[slice]:
+def _at_the_end(e: TakeEvidence) -> Sequence[slice]:
     """By command, the last frames before the next one comes; after the last, all from then on."""
     time, ends = e.since, ends_of(e)
     first, after = (np.searchsorted(time, t, side="right") for t in (ends - 0.06, ends))
