@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.arm import arm, goals, measured, played
+from benchmarks.arm import session as log_session
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import load_session
@@ -12,7 +14,7 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify import subset as share
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.options import PROBLEM
-from workbench.identify.preparation import gather
+from workbench.identify.preparation import gather, prepare
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
@@ -176,3 +178,16 @@ def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones
                for e, w in zip(shorter, evidence))
     judging = replace(evidence[1], uses=dict.fromkeys(evidence[1].uses, np.zeros(len(evidence[1].recorded), dtype=bool)))
     assert [e.until for e in at_most([evidence[0], judging], 2.0)] == pytest.approx([2.0, 0.0])
+
+
+def test_of_a_logs_nominal_rollout_only_the_rows_of_the_log_are_kept(tmp_path):
+    model, told = arm(tmp_path), goals(1.0)
+    session = log_session(tmp_path, measured(told, played(model, told, ()), seed=1))
+    takes, _ = read_takes(session)
+    seen = prepare(session, takes, CONFIG, 1, lambda what, done: None)
+    (kept,), (e,) = seen.nominal.values(), seen.evidence
+    (whole,) = roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1, floors=False)
+    assert len(kept) == len(e.take.recorded) < len(whole.nominal)
+    shown, usual = e.take.observe(kept), e.take.observe(whole.nominal)
+    np.testing.assert_array_equal(shown.time, usual.time)
+    np.testing.assert_array_equal(shown.q, usual.q)

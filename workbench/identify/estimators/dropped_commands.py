@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from workbench.effects.registry import effect_named, estimated_by
@@ -183,14 +184,19 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
         if abs(way) < READ_OFF.least_step or not good.any():
             at = goal
             continue
-        went, should = (float(np.median(q[frames[k]][good]) - at) / way for q in (seen, said))
-        if alike and abs(went) < READ_OFF.stayed and should > READ_OFF.went:
+        went = _middle(seen, frames[k], good, at) / way
+        if alike and abs(went) < READ_OFF.stayed and _middle(said, frames[k], good, at) / way > READ_OFF.went:
             missed.append(k)
             alike = False
         else:
             at = goal
             alike = alike or abs(went - 1) < READ_OFF.stayed
     return tuple(missed)
+
+
+def _middle(angle: Array, frames: slice, good: NDArray[np.bool_], since: float) -> float:
+    """The median way of a joint in the good ones of some frames [rad], from where it was."""
+    return float(np.median(angle[frames][good]) - since)
 
 
 def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:

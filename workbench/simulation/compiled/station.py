@@ -245,13 +245,15 @@ class CompiledJob:
     def _read(self, log: Log, as_seen: bool) -> Take:
         job, joint, config = self.job, self.machine.servos.joint, self.config
         time = np.arange(len(log.q)) * config.logged_every - self.plan.lead
+        alike = np.array_equal(joint, np.arange(log.q.shape[1]))  # then there is nothing to copy
+        q, v = (log.q, log.v) if alike else (log.q[:, joint], log.v[:, joint])
         p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
         if not self.free:
             X = self.tables.X_WBase
             p_WB = np.broadcast_to(X.translation(), (len(time), 3))
             quat_WB = np.broadcast_to(RotationMatrix(X.rotation()).ToQuaternion().wxyz(), (len(time), 4))
-        take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=log.q[:, joint], starts_at=0.0,
-                    base=config.base, v=log.v[:, joint], p_WB=p_WB, quat_WB=quat_WB,
+        take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=q, starts_at=0.0,
+                    base=config.base, v=v, p_WB=p_WB, quat_WB=quat_WB,
                     torque=log.torque if len(log.torque) else None, contact=self._contact(log, time), commands=job.commands)
         take = self._as_built(take, log) if as_seen else take
         del log  # of a recording of 1,000 s a hundred MB, more than half of which a held robot's take does not need
