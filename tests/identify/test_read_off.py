@@ -173,8 +173,11 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    before = nominal_residuals(quiet, evaluator)
+    before, sent = nominal_residuals(quiet, evaluator), evaluator
     evaluator, (missed,) = with_dropped_commands(evaluator, quiet[0], before)
+    again = TakesAsPlayed(sent, (missed,)).as_found()
+    np.testing.assert_array_equal(again.evidence[0].take.commands.goals, evaluator.evidence[0].take.commands.goals)
+    np.testing.assert_array_equal(sent.evidence[0].take.commands.goals, commands.goals)
     assert (missed.joint, missed.count, missed.of) == ("one", 1, len(commands.times))
     finding = missed.finding()
     share = finding.parameters["probability"]

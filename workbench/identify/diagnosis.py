@@ -25,6 +25,7 @@ from workbench.identify.evidence.explain import explained_by_evidence, is_by_log
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
+from workbench.identify.heap import give_back
 from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
 from workbench.identify.loads import unloaded_joints
@@ -143,11 +144,15 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     pool += read_off_candidates(known.model, evidence, begun.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
+    give_back()
+
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
     search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
     options = settings.options if gap else settings.options.without_names()
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
                            progress, options))
+
+    give_back()
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)

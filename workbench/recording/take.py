@@ -104,9 +104,15 @@ class Take:
 
         time = np.asarray(time, dtype=float)
 
+        def hold(row: Array) -> Array:
+            inside = (time >= self.time[0]) & (time <= self.time[-1])
+            return np.broadcast_to(row, (len(time), len(row))) if inside.all() else np.where(inside[:, None], row, np.nan)
+
         def linear(y: Array | None) -> Array | None:
             if y is None:
                 return None
+            if _is_repeated(y):
+                return hold(y[0])
             return np.column_stack([np.interp(time, self.time, c, left=np.nan, right=np.nan) for c in y.T])
 
         def resample_tracks(tracks: Mapping[str, BodyTrack]) -> dict[str, BodyTrack]:
@@ -115,6 +121,8 @@ class Take:
         def slerp(q: Array | None) -> Array | None:
             if q is None:
                 return None
+            if _is_repeated(q):
+                return hold(q[0])
             out = np.full((len(time), 4), np.nan)
             good = np.isfinite(q).all(axis=1)
             if good.sum() < 2:
@@ -136,3 +144,8 @@ class Take:
             bodies=resample_tracks(self.bodies), links=resample_tracks(self.links),
             contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]
         )
+
+
+def _is_repeated(y: Array) -> bool:
+    """Whether it is one row, seen and stored once, as the pose of a base that is held."""
+    return len(y) > 1 and y.strides[0] == 0 and bool(np.isfinite(y[0]).all())

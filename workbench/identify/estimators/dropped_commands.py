@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from workbench.effects.registry import effect_named, estimated_by
@@ -147,8 +148,8 @@ def stands_at_an_end(evidence: Sequence[TakeEvidence], joint: str, lost: Mapping
             stood = float(np.median(last[np.isfinite(last)]))
             way = 1.0 if goal > stood else -1.0
             if way not in ends:
-                ends[way] = max(float(np.nanquantile(way * _observed_angle(e, joint), 0.995))
-                                for e in evidence if joint in e.joints)
+                went = (way * _observed_angle(e, joint) for e in evidence if joint in e.joints)
+                ends[way] = max(float(np.nanquantile(angle, 0.995)) for angle in went)
             if not (way * goal > ends[way] and way * stood > ends[way] - READ_OFF.at_stop):
                 return False
     return True
@@ -159,7 +160,7 @@ def _observed_angle(e: TakeEvidence, joint: str) -> Array:
     return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
 
-def _at_the_end(e: TakeEvidence) -> list[slice]:
+def _at_the_end(e: TakeEvidence) -> Sequence[slice]:
     """By command, the last frames before the next one comes; after the last, all from then on."""
     time, ends = e.since, ends_of(e)
     first, after = (np.searchsorted(time, t, side="right") for t in (ends - 0.06, ends))
@@ -183,14 +184,19 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
         if abs(way) < READ_OFF.least_step or not good.any():
             at = goal
             continue
-        went, should = (float(np.median(q[frames[k]][good]) - at) / way for q in (seen, said))
-        if alike and abs(went) < READ_OFF.stayed and should > READ_OFF.went:
+        went = _middle(seen, frames[k], good, at) / way
+        if alike and abs(went) < READ_OFF.stayed and _middle(said, frames[k], good, at) / way > READ_OFF.went:
             missed.append(k)
             alike = False
         else:
             at = goal
             alike = alike or abs(went - 1) < READ_OFF.stayed
     return tuple(missed)
+
+
+def _middle(angle: Array, frames: slice, good: NDArray[np.bool_], since: float) -> float:
+    """The median way of a joint in the good ones of some frames [rad], from where it was."""
+    return float(np.median(angle[frames][good]) - since)
 
 
 def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
