@@ -122,8 +122,8 @@ def _apply_to_sdf(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]
 
     if not own:
         return build()
-    said = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
-    return _builds.get((model.path, model.path.stat().st_mtime_ns, said), build)
+    key = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
+    return _builds.get((model.path, model.path.stat().st_mtime_ns, key), build)
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:

@@ -21,7 +21,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
@@ -192,7 +192,7 @@ class Effect:
         """Changes servo constants of the joints in `columns`."""
         return law
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm | None:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm | None:
         """Behaviour of servos beyond constants; here (n,): the servos named in `where`. None: nothing."""
         return None
 

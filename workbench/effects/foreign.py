@@ -27,9 +27,9 @@ def _problems(effect: Effect) -> Iterator[str]:
     if not isinstance(effect.name, str) or not effect.name.isidentifier():
         yield f"name: expected letters, digits and underscores, got {effect.name!r}"
     for key, words in _WORDS.items():
-        said = getattr(effect, key)
-        if said not in get_args(words) and not (said is None and key != "layer"):
-            yield f"{key}: expected one of {', '.join(get_args(words))}, got {said!r}"
+        value = getattr(effect, key)
+        if value not in get_args(words) and not (value is None and key != "layer"):
+            yield f"{key}: expected one of {', '.join(get_args(words))}, got {value!r}"
     if not isinstance(effect.places, tuple) or not effect.places or not set(effect.places) <= set(get_args(Place)):
         yield f"places: expected a tuple of some of {', '.join(get_args(Place))}, got {effect.places!r}"
     if type(effect).sentence is Effect.sentence:

@@ -23,7 +23,7 @@ Imitator = Literal["a", "b"]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class PairChannels:
     """The channels of a pair's takes, over sigma, flattened, with frames whose errors are correlated weighted to count as one.
 
     a, b (m,): of each rival. of_a, of_b (m, p): sensitivities of each to its own parameters; nuisance (m, k): to the unknowns of
@@ -42,9 +42,9 @@ class Shown:
     counts: Array
 
     @staticmethod
-    def join(parts: Sequence[Shown]) -> Shown:
-        """Of takes that follow each other."""
-        return Shown(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(Shown)))
+    def join(parts: Sequence[PairChannels]) -> PairChannels:
+        """The channels of takes that follow each other."""
+        return PairChannels(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(PairChannels)))
 
     def chi_squared(self) -> float:
         """Cost of the better imitator: of the residual, and of moving far from the session's estimate."""
@@ -92,7 +92,7 @@ def project(take: Take, sight: ObservationModel) -> Array:
     return np.asarray(np.nan_to_num(q[~take.resting]))
 
 
-def show(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> Shown:
+def project_pair(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> PairChannels:
     """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
     a, b, *others = (project(t, sight) for t in takes)
     floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(project(finer, sight) - a), axis=0))
@@ -102,11 +102,12 @@ def show(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take
     weight = counts / np.sqrt(1 + floor**2)
     of_a = [(o - a) / s for o, s in zip(others[:p], pair.a.steps())]
     of_b = [(o - b) / s for o, s in zip(others[p:], pair.b.steps())]
-    return Shown((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n),
-                 _flat(left_open(a, sight), weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
+    unknowns = _flat(recording_unknowns(a, sight), weight, n)
+    return PairChannels((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n), unknowns,
+                        np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
 
 
-def left_open(y: Array, sight: ObservationModel) -> list[Array]:
+def recording_unknowns(y: Array, sight: ObservationModel) -> list[Array]:
     """Unknowns of a recording, as changes of the channels (N, c) over sigma, each (N, c) by one standard deviation: the time of
     the first command, and the angle at which each joint was zeroed."""
     if not sight.captured:
@@ -119,8 +120,8 @@ def left_open(y: Array, sight: ObservationModel) -> list[Array]:
     return out
 
 
-def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
-    """The same where the imitator shows y (m,), over sigma."""
+def with_channels(known: PairChannels, y: Array, imitator: Imitator) -> PairChannels:
+    """The pair with other channels y (m,), over sigma, of the imitator."""
     return replace(known, a=known.weight * y) if imitator == "a" else replace(known, b=known.weight * y)
 
 
@@ -138,7 +139,7 @@ def _flat(columns: Sequence[Array], weight: Array, frames: int) -> Array:
     return np.stack([(weight * c).ravel() for c in columns], axis=1)
 
 
-def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
+def fit_to_each_other(pair: Pair, known: PairChannels, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
     """How near each rival comes to the other: Gauss-Newton with the sensitivities that are known, both at once.
 
     play: what models show over sigma, each (m,) as in `known`.
@@ -151,9 +152,9 @@ def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[Robo
                   for i, (here, at) in best.items() if i not in settled for share in (1.0, 0.4)]
         if not trials:
             break
-        ends: dict[Imitator, list[tuple[Shown, Closest]]] = {}
+        ends: dict[Imitator, list[tuple[PairChannels, Closest]]] = {}
         for (i, x), y in zip(trials, play([rivals[i].move(x).model for i, x in trials])):
-            now = reshown(known, y, i)
+            now = with_channels(known, y, i)
             ends.setdefault(i, []).append((now, now.closest(i, x, moving=False)))
         for i, options in ends.items():
             nearest = min(options, key=lambda o: o[1].cost)

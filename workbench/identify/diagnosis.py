@@ -12,7 +12,7 @@ from pathlib import Path
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
-from workbench.compare.logged import how_logged
+from workbench.compare.logged import describe_logging
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
@@ -77,7 +77,7 @@ class _Settings:
 
     @property
     def options(self) -> EvidenceOptions:
-        """Of the search of servo logs."""
+        """Options of the search of servo logs."""
         return EvidenceOptions() if self.previous is None else EvidenceOptions.since()
 
     def provenance(self) -> dict[str, object]:
@@ -112,7 +112,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
 
 
 def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, engine: Mapping[str, str]) -> DiagnosisResult:
-    """By one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
+    """Diagnoses with one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
     progress = settings.progress
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
@@ -172,7 +172,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at) | how_logged([e.take for e in evidence])
+        | subset_used(found.looked_at) | describe_logging([e.take for e in evidence])
         | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)
@@ -200,7 +200,7 @@ def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake
 def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
-    """Each take before and after. fitted: the model with its effects; None: nothing was found."""
+    """A report of each take before and after the diagnosis. fitted: the model with its effects; None: nothing was found."""
     was = [e.take.observe(nominal[e.name]) for e in evaluator.evidence]
     now = was if fitted is None else evaluator.observe(fitted, evaluator.config)
     out = []

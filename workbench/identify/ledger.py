@@ -47,7 +47,8 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
 
 
 def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
-    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is fixed."""
+    """The layer of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is
+    fixed."""
     if channel in BODY:
         return "inertia" if channel in ("height", "roll", "pitch") else "ground"
     if ACROSS in channel:

@@ -51,12 +51,12 @@ class TakeEvidence:
 
     @property
     def name(self) -> str:
-        """Of the take."""
+        """Name of the take."""
         return self.take.spec.name
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Of the robot, in the model's order."""
+        """Joints of the robot, in the model's order."""
         return self.take.recorded.joints
 
     @property
@@ -85,11 +85,11 @@ class TakeEvidence:
                        uses={use: mask[:frames] & early for use, mask in self.uses.items()})
 
     def zero(self, joint: str) -> float:
-        """Where a joint's recorded angle is zero, on its servo's scale [rad]."""
+        """Recorded zero of a joint's angle, on its servo's scale [rad]."""
         return float(self.take.measurement.rest_pose.get(joint, 0.0)) if self.take.recorded.zeroed else 0.0
 
     def columns(self, joint: str | None = None) -> NDArray[np.int_]:
-        """Of one joint's channels; of every channel."""
+        """Indices of one joint's channels; without a joint, of all."""
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
     def observe(self, rollout: Take, model: RobotModel) -> Array:
@@ -150,7 +150,7 @@ def part_of(since: Array) -> NDArray[np.int_]:
 
 
 def running_sum(columns: Array, frames: int) -> Array:
-    """Of each column (N, c), over `frames` around each frame; what lies beyond the ends is nothing."""
+    """Sum of each column (N, c) over `frames` around each frame; beyond the ends it counts as zero."""
     kernel = np.ones(max(1, frames))
     return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
 

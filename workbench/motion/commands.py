@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Commands:
     joints: tuple[str, ...]
     goals: Array
     speeds: Array
-    enabled: NDArray[np.bool_]
+    enabled: Mask
     end: float
     poses: NDArray[np.int_]
     begun: bool = False
@@ -53,7 +53,7 @@ class Commands:
         return out
 
     def slow_down(self, factor: float) -> Commands:
-        """The same commands, slowed down by a factor."""
+        """The same commands slowed down by a factor: times multiplied, speeds divided by it."""
         return replace(self, times=factor * self.times, speeds=self.speeds / factor, end=factor * self.end)
 
     def column(self, joint: str) -> int:
@@ -61,7 +61,7 @@ class Commands:
         return self.joints.index(joint)
 
     def reordered(self, joints: tuple[str, ...]) -> Commands:
-        """The same with columns in another order; joints without a command hold neutral, those left out are dropped."""
+        """The same commands with columns in another order; joints without a command hold neutral, those left out are dropped."""
         if joints == self.joints:
             return self
         shape = (len(self.times), len(joints))

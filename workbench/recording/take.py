@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.recording.body_track import BodyTrack
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Take:
     contact: Mapping[str, Array] = field(default_factory=dict)
     commands: Commands | None = None
     problems: tuple[str, ...] = ()
-    mended: NDArray[np.bool_] | None = None
+    mended: Mask | None = None
     off_axis: Array | None = None
     servo_q: Array | None = None
     links: Mapping[str, BodyTrack] = field(default_factory=dict)
@@ -76,7 +75,7 @@ class Take:
         return self.time - self.starts_at
 
     @property
-    def resting(self) -> NDArray[np.bool_]:
+    def resting(self) -> Mask:
         """Frames before the first command."""
         return np.asarray(self.time < self.starts_at - 1e-9)
 
@@ -87,7 +86,7 @@ class Take:
         return replace(self, q=self.q - np.nanmean(self.q[self.resting], axis=0), zeroed=True)
 
     def first(self, frames: int) -> Take:
-        """Its first frames."""
+        """The take's first frames."""
         def cut(column: Array | None) -> Array | None:
             return None if column is None else column[:frames]
 

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Instant, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class FrictionAsymmetry(Effect):
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         ratio = values["ratio"]
         return _Asymmetric(here.astype(float) * (ratio - 1.0) / (ratio + 1.0))
 

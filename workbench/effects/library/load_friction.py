@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import LoadFrictionTerm, ServoTerm
+from workbench.types import Mask
 
 
 class LoadFriction(Effect):
@@ -45,7 +43,7 @@ class LoadFriction(Effect):
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, 0.0, self.parameters[2].typical, 0.0
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         at = here.astype(float)
         return LoadFrictionTerm(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
 

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class StribeckFriction(Effect):
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, self.parameters[1].typical
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Sticking(here.astype(float) * values["torque"], values["speed"])
 
 

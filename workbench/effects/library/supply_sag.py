@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 LEAST_DRAWN = 0.3
 """Least change of the summed duties for a log's voltage to determine a sag."""
@@ -59,7 +58,7 @@ class SupplySag(Effect):
                 drops.append(-float(np.polyfit(drawn[good], log.voltage[good], 1)[0]))
         return mean_of_logs(drops, COUNT)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Sagging(values["drop"])
 
 

@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
+from workbench.types import Mask
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class ThermalFade(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         return f"The servos lose {100 * scalar(spec, 'rate'):.1f} % of their torque per second after the first command."
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Fading(values["rate"])
 
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class TorqueSaturation(Effect):
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Saturating(np.where(here, values["torque"], np.inf))
 
 

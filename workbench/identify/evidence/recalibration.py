@@ -13,7 +13,7 @@ from workbench.identify.results.findings import Recalibrated
 from workbench.robot import RobotModel
 
 
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
+def list_changes(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
     """Nominal and recalibrated values, those that went furthest first."""
     sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
     out = []

@@ -166,7 +166,7 @@ class CandidateEvaluation:
         return max(max(of.values(), default=0.0) if joint is None else of.get(joint, 0.0) for of in seen)
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
-        """Of the group, those that are not predicted to be far behind a rival."""
+        """Indices of the candidates of the group that are not predicted to be far behind a rival."""
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
