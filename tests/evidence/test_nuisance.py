@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.evidence.linear import candidate
+from tests.evidence.linear import JOINT, candidate
 from tests.servo_rig import rig_model
 from workbench.effects.base import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
-from workbench.identify.evidence.hypothesis import Uncertain, start
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain, start
 from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.recalibration import list_changes
@@ -154,3 +154,12 @@ def test_ends_that_registers_set_refute_nothing():
     h = start(()).with_effect(held, held.bounds()[1])
     assert not at_their_end(h, [gain])
     assert at_their_end(h, [held])
+
+
+def test_every_number_of_the_law_that_an_effect_changes_too_is_paired_with_it():
+    """Their sum alone is seen, of a zero as of a friction."""
+    numbers = (Uncertain(JOINT, "coulomb_friction", 0.2), Uncertain(JOINT, ZERO, 0.02))
+    at = start(numbers)
+    for name, first in (("coulomb_friction", 0), ("zero_offset", 1)):
+        assert at.with_effect(candidate(name), np.array([1.0])).alike() == [[first, 2]], name
+    assert at.with_effect(candidate("backlash"), np.array([1.0])).alike() == []

@@ -248,13 +248,13 @@ def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
     evaluator = recorded_with(quiet, stopped)
     kept = poses_lost(evaluator, quiet[0], "two", {0: ()}, nominal_residuals(quiet, evaluator))[0][0]
     assert len(kept) == 2
-    assert all(stands_at_an_end(evaluator.evidence, 0, "two", k) for k in kept)
+    assert stands_at_an_end(evaluator.evidence, "two", {0: kept})
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
     ((lost,),) = poses_lost(evaluator, quiet[0], "one", {0: ()}, nominal_residuals(quiet, evaluator))[0].values()
-    assert not stands_at_an_end(evaluator.evidence, 0, "one", lost)
+    assert not stands_at_an_end(evaluator.evidence, "one", {0: (lost,)})
 
 
 def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):

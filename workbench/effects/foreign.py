@@ -41,11 +41,11 @@ def _problems(effect: Effect) -> Iterator[str]:
             yield (f"parameter '{p.name}': expected low <= typical <= high, low < high, si not 0; got low {p.low:g}, "
                    f"typical {p.typical:g}, high {p.high:g}, si {p.si:g}")
     if len({p.name for p in effect.parameters}) < len(effect.parameters):
-        yield "parameters: expected names that differ"
+        yield "parameters: expected different names"
 
 
 def answering_for(effect: Effect, at: str) -> Effect:
-    """The same effect; what its own hooks raise becomes an InputError that names `at`, the effect and the hook."""
+    """The same effect; an exception in one of its hooks becomes an InputError that names `at`, the effect and the hook."""
     for hook in HOOKS:
         if getattr(type(effect), hook) is not getattr(Effect, hook):
             object.__setattr__(effect, hook, partial(_call_hook, effect, hook, at))

@@ -104,7 +104,7 @@ class JointMoves:
         for size, beat, times in ((4, 0.06, 6), (8, 0.09, 6), (15, 0.14, 4)):
             for k in range(2 * times):
                 path.to(self._offset(size * (-1) ** k, {}), least=beat)
-        return path.home().segment("trembling")
+        return path.home().segment("small oscillation")
 
     def _approach(self, name: str, posture: Mapping[str, float]) -> Segment:
         """Moves that reach the same angle from both sides, from near and from far."""
@@ -138,7 +138,7 @@ class JointMoves:
         path = self._path().to(up, EXPERIMENT.quick).hold(EXPERIMENT.pause)
         for pose, speed in ((down, EXPERIMENT.slow), (up, EXPERIMENT.quick), (down, EXPERIMENT.quick)):
             path.to(pose, speed).hold(EXPERIMENT.pause)
-        return path.home().segment("load turned round")
+        return path.home().segment("load reversed")
 
     def _postures(self) -> dict[str, dict[str, float]]:
         """Postures in which gravity pulls the joint one way and the other as hard as may be; neutral for several joints."""
@@ -172,7 +172,7 @@ def long_runs(model: RobotModel, reach: Reach, focus: Sequence[str], seconds: fl
     while path.times[-1] < seconds - 1.5:
         size = math.radians(next(sizes))
         path.to({j: reach.within(j, size) for j in focus}).hold(0.12)
-    work = path.home().segment("long work", long=True)
+    work = path.home().segment("sustained load", long=True)
     path = Path(model.joints, reach.speeds)
     while path.times[-1] < seconds - 3.5:
         for k in range(18):  # many short poses on a slow zigzag, then few long ones on another

@@ -1,4 +1,4 @@
-"""A servo that sticks: more dry friction at rest than when it turns."""
+"""A servo sticks: it has more dry friction at rest than in motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _Sticking(ServoTerm):
 
 
 class StribeckFriction(Effect):
-    """More Coulomb friction at rest, which fades with speed as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
+    """Additional Coulomb friction at rest, decaying with speed as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
 
     name = "stribeck_friction"
     layer = "actuator"

@@ -1,4 +1,4 @@
-"""A weak supply: its voltage drops with the current that all servos draw together."""
+"""A weak supply: its voltage drops with the total current of all servos."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class SupplySag(Effect):
         return f"The supply drops by {scalar(spec, 'drop'):.2f} V for each servo at full duty."
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """The slope of the voltage register over the sum of all servos' duties."""
+        """The slope of the voltage register over the sum of the servos' duties."""
         drops = []
         for log in logs:
             if log.voltage is None or not log.duty:

@@ -1,4 +1,4 @@
-"""A motor whose torque ends early: the driver's current limit, heat, or another servo of the family."""
+"""A motor's torque is limited: by the driver's current limit, by heat, or because it is another servo of the family."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ class _Ceiling(ServoTerm):
 
 
 class TorqueCeiling(Effect):
-    """The motor's torque, duty torque less back-EMF, is limited: the driver's current limit, heat, or another servo."""
+    """The motor's torque (duty torque minus back-EMF) is limited: by the driver's current limit, by heat, or
+    because the servo is of another model."""
 
     name = "torque_ceiling"
     layer = "actuator"
@@ -39,7 +40,7 @@ class TorqueCeiling(Effect):
     parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The motor of {', '.join(spec.where)} gives no more than {scalar(spec, 'torque'):.2f} N m."
+        return f"The motor torque of {', '.join(spec.where)} is limited to {scalar(spec, 'torque'):.2f} N m."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)

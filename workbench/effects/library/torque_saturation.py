@@ -1,4 +1,4 @@
-"""A motor whose torque grows less and less with its duty: an H-bridge's drop, a magnetic circuit, a weak driver."""
+"""A motor's torque grows less than in proportion to its duty: a drop in the H-bridge, magnetic saturation, a weak driver."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class _Saturating(ServoTerm):
 
 
 class TorqueSaturation(Effect):
-    """A motor whose torque x, duty torque less back-EMF, acts as x / (1 + |x|/torque): nearly all of it while small, half of it
-    at `torque`, never more than that. Smooth, unlike a ceiling."""
+    """The motor's torque x (duty torque minus back-EMF) acts as x / (1 + |x|/torque): almost unchanged while it is small, halved
+    at `torque`, and never above `torque`. Unlike a ceiling, it is smooth."""
 
     name = "torque_saturation"
     layer = "actuator"
@@ -40,7 +40,7 @@ class TorqueSaturation(Effect):
     parameters = (Parameter("torque", "N m", 0.02, 1e8, 1.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The motor of {', '.join(spec.where)} saturates: of {scalar(spec, 'torque'):.2f} N m half arrives."
+        return f"The motor of {', '.join(spec.where)} saturates: a torque of {scalar(spec, 'torque'):.2f} N m is halved."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)

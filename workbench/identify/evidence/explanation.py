@@ -12,8 +12,9 @@ import numpy as np
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
+from workbench.identify.evidence.hypothesis import ZERO
 from workbench.identify.evidence.leftover import list_leftover
-from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widen, with_known
+from workbench.identify.evidence.nuisance import as_mapping, mixing, turned_horn, widen, with_known
 from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.evidence.step_errors import extrapolate
 from workbench.identify.evidence.tied import as_torque

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import gammaln
 from scipy.stats import t as student_t
 
+from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
 from workbench.types import Array, Mask
@@ -24,6 +25,8 @@ FAR = EvidenceOptions.far
 """Limit of a recalibrated constant [standard deviations]: beyond it is a finding, named after the corresponding effect."""
 UNNAMED = "unknown torque"
 """Represents a torque law among the terms of a hypothesis."""
+ZERO = "zero"
+"""Name of a joint's zero among the numbers that are recalibrated."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -45,6 +48,11 @@ class Uncertain:
     def changes(self) -> dict[str, float]:
         """How far one standard deviation moves each number: the logarithm of it, [rad] of ZERO."""
         return {self.name: self.sd, **dict(self.others)}
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect that adds to the same constant, if there is one."""
+        return estimated_by("turn about an axis")[0].name if self.name == ZERO else self.name
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
@@ -98,7 +106,7 @@ class Hypothesis:
     def alike(self) -> list[list[int]]:
         """Pairs of theta that represent one constant of the law: its recalibration, and the effect of that name there."""
         at: dict[tuple[str, tuple[str, ...]], int] = {
-            (n.name, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
+            (n.effect, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
         both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
         return [[k, s.start] for k, s in both if k is not None]
 

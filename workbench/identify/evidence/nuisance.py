@@ -10,13 +10,12 @@ from functools import lru_cache
 import numpy as np
 
 from workbench.effects.registry import estimated_by
-from workbench.identify.evidence.hypothesis import Uncertain
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance
 from workbench.types import Array
 
-ZERO = "zero"
 ZERO_SD = math.radians(1.15)
 """Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
 it by eye."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.identify.evidence.hypothesis import Uncertain
-from workbench.identify.evidence.nuisance import UNITS, ZERO, changed_by, mixing, nominal_value
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain
+from workbench.identify.evidence.nuisance import UNITS, changed_by, mixing, nominal_value
 from workbench.identify.results.findings import Recalibrated
 from workbench.robot import RobotModel
 

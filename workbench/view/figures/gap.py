@@ -98,7 +98,7 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
     axes.set_axis_off()
-    axes.set_title("error over noise and numerics, before")
+    axes.set_title("error / noise and numerics, nominal model")
     return figure
 
 
@@ -165,7 +165,7 @@ def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
     figure = new_figure(12, 0.24 * len(order) + 1.7)
     panels = figure.subplots(1, len(takes), sharey=True, squeeze=False)[0]
     for axes, take, (before, after) in zip(panels, takes, ratios):
-        axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g} times")
+        axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g}×")
         rows = [i for i, c in enumerate(order) if np.isfinite(before.get(c, np.nan))]
         b, a = ([values[order[i]] for i in rows] for values in (before, after))
         axes.hlines(rows, b, a, color=COMMAND, linewidth=1.2, zorder=2)
@@ -174,7 +174,7 @@ def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
         axes.set_xlim(left=0)
         axes.grid(False, axis="y")
         axes.set_title(take.name)
-        axes.set_xlabel("error over noise and numerics")
+        axes.set_xlabel("error / noise and numerics")
     panels[0].set_yticks(range(len(order)), order, fontsize=10)
     panels[0].set_ylim(len(order) - 0.4, -0.6)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
