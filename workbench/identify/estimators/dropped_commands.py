@@ -147,7 +147,8 @@ def stands_at_an_end(evidence: Sequence[TakeEvidence], joint: str, lost: Mapping
             stood = float(np.median(last[np.isfinite(last)]))
             way = 1.0 if goal > stood else -1.0
             if way not in ends:
-                ends[way] = max(float(np.nanquantile(way * _observed_angle(e, joint), 0.995)) for e in evidence if joint in e.joints)
+                ends[way] = max(float(np.nanquantile(way * _observed_angle(e, joint), 0.995))
+                                for e in evidence if joint in e.joints)
             if not (way * goal > ends[way] and way * stood > ends[way] - READ_OFF.at_stop):
                 return False
     return True
