@@ -121,7 +121,7 @@ def _trunk(model: RobotModel) -> list[str]:
 
 
 def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
-    """The joints that a pair speaks of: its own; the joint that carries its link; else thighs and knees, or all of them."""
+    """The joints that a pair concerns: its own; the joint that carries its link; else thighs and knees, or all of them."""
     k = model.kinematics
     named = [w if w in model.joints else k.parent_joint.get(w) for e in pair.effects for w in e.where]
     joints = tuple(dict.fromkeys(j for j in named if j in model.joints))
@@ -131,7 +131,7 @@ def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
 
 
 class _Bench:
-    """Tries pieces on one base, puts them together and proves the whole."""
+    """Designs the experiment on one base: tries segments, combines them, and verifies the whole motion."""
 
     def __init__(self, nominal: RobotModel, base: Base, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.nominal, self.base, self.sight, self.progress = nominal, base, sight, progress
@@ -139,7 +139,7 @@ class _Bench:
         self.runs = Runs(self.reach, base, sight, n_jobs, progress)
 
     def design(self, pairs: Sequence[Pair]) -> Experiment:
-        """The best motion."""
+        """The best motion for these pairs; a rest of a second where no segment separates any."""
         pieces: dict[str, Segment] = {}
         tried: list[dict[str, PairChannels]] = []
         for i, pair in enumerate(pairs):
@@ -162,7 +162,8 @@ class _Bench:
         return pieces + (long_runs(self.nominal, self.reach, focus, EXPERIMENT.longest) if lasting else [])
 
     def _try_pieces(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, PairChannels]:
-        """What pieces show of a pair, by name: both on all of them, their neighbours on those where they differ most."""
+        """The channels of a pair on each segment, by its name: of both rivals on all segments, of their neighbours on those where
+        the two differ most."""
         takes = self.runs.play_all(pair.models, [[s] for s in library], what)
         rough = {s.name: (s, of, project_pair(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
         best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:EXPERIMENT.kept]

@@ -1,4 +1,4 @@
-"""What takes of two rivals show, and how near each could come to the other by moving its own numbers."""
+"""Channels of two rivals' takes, and how closely each rival imitates the other by adapting its own parameters."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ class PairChannels:
         return min(self.closest("a").cost, self.closest("b").cost)
 
     def closest(self, imitator: Imitator, x: Array | None = None, moving: bool = True) -> Closest:
-        """How near one comes to the other, now at x (p,), by moving its numbers (unless not `moving`) and all that is open."""
+        """How closely one rival imitates the other from parameters x (p,), by adapting them (if `moving`) and the unknowns of the
+        recording."""
         S = self.of_a if imitator == "a" else self.of_b
         D = self.b - self.a if imitator == "a" else self.a - self.b
         x = np.zeros(S.shape[1]) if x is None else x
@@ -79,7 +80,7 @@ class Closest:
 
 
 def channels(sight: ObservationModel, base: str) -> tuple[str, ...]:
-    """Seen: the joints that have a sigma, and on the ground the body, where cameras see it."""
+    """Names of the observed channels: the joints that have a sigma, and on a free base the body's, where cameras see it."""
     return (*sight.sigma, *(BODY if base == "free" and sight.captured else ()))
 
 
@@ -93,7 +94,8 @@ def project(take: Take, sight: ObservationModel) -> Array:
 
 
 def project_pair(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> PairChannels:
-    """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
+    """The channels of a pair in takes of its models and of their neighbours, in that order. finer: the first rival's with the
+    step halved, whose difference counts as error."""
     a, b, *others = (project(t, sight) for t in takes)
     floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(project(finer, sight) - a), axis=0))
     n, c = a.shape
@@ -140,14 +142,15 @@ def _flat(columns: Sequence[Array], weight: Array, frames: int) -> Array:
 
 
 def fit_to_each_other(pair: Pair, known: PairChannels, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
-    """How near each rival comes to the other: Gauss-Newton with the sensitivities that are known, both at once.
+    """How closely each rival imitates the other: Gauss-Newton with the sensitivities that are known, both at once.
 
-    play: what models show over sigma, each (m,) as in `known`.
+    play: rolls models out; returns the channels of each, over sigma, (m,) as in `known`.
     """
     rivals: dict[Imitator, Rival] = {"a": pair.a, "b": pair.b}
     best = {i: (known, known.closest(i, moving=False)) for i in rivals}
     settled = {i for i, r in rivals.items() if not len(r.steps())}
     for _ in range(EXPERIMENT.rounds):
+        # the full step, and a shorter one in case the response is not linear
         trials = [(i, at.x + share * (here.closest(i, at.x).x - at.x))
                   for i, (here, at) in best.items() if i not in settled for share in (1.0, 0.4)]
         if not trials:

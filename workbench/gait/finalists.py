@@ -36,8 +36,8 @@ class Screening:
 def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Sequence[RobotModel], screening: Screening,
               options: CertifyOptions, memory: Path | None, n_jobs: int, progress: Progress) -> Iterator[Candidate]:
     """Gaits of a search that keep every limit as long and as finely as the certificate walks: trimmed on the nominal robot, which
-    then has to come back to its cycle from every entry, and in rounds on fresh robots. What breaks a limit comes, too, so that
-    it can be said which; its `good` is false."""
+    then has to come back to its cycle from every entry, and in rounds on fresh robots. Gaits that break a limit are yielded,
+    too, with `good` false, so that the limit can be named."""
     config, space = replace(SEARCH, time_step=options.step), space_of(machine, request)
     nominal = Evaluator(machine, request, (), memory, n_jobs, config, options.seconds)
     others = Evaluator(machine, request, fresh, memory, n_jobs, config, options.draw_seconds)

@@ -134,14 +134,14 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     read_off = (*build.measured, *read_off_registers(session))
     build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
-    sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
-    evidence = sent.evidence
-    begun = Search(sent, known.model).evaluate([])
-    played = TakesAsPlayed(sent, without=settings.without)
-    evaluator, missed = played.without_missed(known.model, begun.residuals)
+    as_built = _again(evaluator, known, takes, progress) if build.measured else evaluator
+    evidence = as_built.evidence
+    start = Search(as_built, known.model).evaluate([])
+    as_played = TakesAsPlayed(as_built, without=settings.without)
+    evaluator, missed = as_played.without_missed(known.model, start.residuals)
     unloaded = unloaded_joints(known.model, evidence)
     pool = build.select_untried(candidates(known.model, evidence, unloaded))
-    pool += read_off_candidates(known.model, evidence, begun.residuals)
+    pool += read_off_candidates(known.model, evidence, start.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     give_back()
@@ -149,7 +149,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
     search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
     options = settings.options if gap else settings.options.without_names()
-    found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
+    found = search(Problem(evaluator, known.model, start.residuals, pool, replace(as_played, missed=missed), settings.thorough,
                            progress, options))
 
     give_back()
