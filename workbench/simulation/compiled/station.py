@@ -244,7 +244,7 @@ class CompiledJob:
 
     def _read(self, log: Log, as_seen: bool) -> Take:
         job, joint, config = self.job, self.machine.servos.joint, self.config
-        time = np.arange(len(log.q)) * config.logged_every - self.plan.lead
+        time = np.arange(len(log.q), dtype=float) * config.logged_every - self.plan.lead
         alike = np.array_equal(joint, np.arange(log.q.shape[1]))  # then there is nothing to copy
         q, v = (log.q, log.v) if alike else (log.q[:, joint], log.v[:, joint])
         p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
