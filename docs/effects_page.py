@@ -25,8 +25,8 @@ LAYERS = {
 
 
 class Seen(NamedTuple):
-    """One effect: its formula (symbols in the page's head), its signature in a recording, and the effects with which it is easily
-    confused."""
+    """Of one effect: the formula (symbols: head of the page), the signature in a recording, and the effects with which it is
+    easily confused."""
 
     formula: str
     looks: str
@@ -35,57 +35,57 @@ class Seen(NamedTuple):
 
 SEEN: dict[str, Seen] = {
     "backlash": Seen(
-        "`|q_link − q| ≤ gap/2`; inside it the link turns freely, but for a damping of 0.5 mN m s/rad",
-        "The link stays behind by the gap wherever the load changes sign; steps of constant size at turning points. Under "
-        "gravity alone it hangs at one side and shows little.",
+        "`|q_link − q| ≤ gap/2`; inside it the link turns freely, with a damping of 0.5 mN m s/rad",
+        "The link lags by the gap wherever the load changes sign: steps of constant size at turning points. Under gravity alone "
+        "the link stays at one end of the gap, and little is visible.",
         "dead_band, coulomb_friction, joint_compliance"),
     "clock_rate": Seen(
         "`t_recording = t_first + ratio · t`",
-        "All joints run later and later, in proportion to time.",
-        "timing_drift, where all dwells are equal"),
+        "The delay of all joints grows in proportion to time.",
+        "timing_drift, if all dwells are equal"),
     "com_shift": Seen(
-        "`c = c₀ + offset`, the inertia about the centre of mass as it was",
-        "The robot leans, and walks turn; joints that carry the link err with gravity.",
-        "payload, com_shift of a neighbour"),
+        "`c = c₀ + offset`, the inertia about the centre of mass unchanged",
+        "The robot leans, and walks turn; joints that carry the link have errors that depend on gravity.",
+        "payload, com_shift of a neighbouring link"),
     "command_delay": Seen(
-        "a command that is due at `t` acts at `t + delay`",
-        "The whole curve comes later by a constant; joints at rest show nothing.",
+        "a command sent at `t` acts at `t + delay`",
+        "The whole curve is delayed by a constant; joints at rest are not affected.",
         "reflected_inertia, a late start"),
     "coulomb_friction": Seen(
         "`τ = −sign(ω) (τ_C + torque)`; at rest it holds up to `τ_C + torque`",
-        "Slow reversals stick; the joint stops short of its goal from either side.",
+        "The joint sticks at slow reversals and stops short of its goal from either side.",
         "dead_band, load_friction"),
     "command_filter": Seen(
         "`T df/dt = goal − f`, `T = T₀ + time`; ref moves to f",
-        "Steps come rounded, and everything later by the time constant; joints at rest show nothing.",
+        "Steps are rounded, and everything is later by the time constant; joints at rest are not affected.",
         "command_delay, goal_ramp"),
     "damping_gain": Seen(
         "`duty = duty(e) − (k₀ + gain) ω`, cut at ±1",
-        "The joint is slower where duty is not full, with torque on alone; at full duty it is as fast as ever.",
+        "The joint is slower while torque is on and duty below its maximum; at full duty its speed is unchanged.",
         "viscous_friction, which also acts with torque off"),
     "dead_band": Seen(
         "`d = |e| − (margin₀ + margin)`",
-        "The joint stops short of its goal by a constant angle, with little torque.",
+        "The joint stops short of its goal by a constant angle, with little motor torque.",
         "backlash, coulomb_friction"),
     "dropped_command": Seen(
-        "`P(pose k is missed) = probability`, each independently; then goal and speed of pose k−1 stay",
+        "`P(pose k is missed) = probability`, each independently; goal and speed of pose k−1 then remain",
         "Single poses are missing: the joint continues as before until the next one.",
         "joint_stop, coulomb_friction"),
     "foot_friction": Seen(
         "`|F_t| ≤ friction · F_n` at this foot",
-        "One foot slips; the robot turns towards or away from it. A robot on a stand shows nothing.",
-        "foot_friction of a neighbour, payload"),
+        "One foot slips, and the robot turns towards or away from it. Not visible on a stand.",
+        "foot_friction of another foot, payload"),
     "friction_asymmetry": Seen(
         "`τ = −sign(ω) τ_C (1 + s sign(ω))`, `s = (ratio − 1)/(ratio + 1)`",
-        "One direction of travel lags more than the other; at rest the error depends on where it came from.",
+        "Motion in one direction lags more than in the other; at rest the error depends on the direction of approach.",
         "coulomb_friction, parallel_spring"),
     "goal_ramp": Seen(
         "`|d ref/dt| ≤ speed`",
-        "Large steps come late in proportion to their size; small and slow ones show nothing.",
+        "Large steps are late in proportion to their size; small and slow ones are not affected.",
         "command_delay, a weak supply, command_filter"),
     "ground_friction": Seen(
         "`|F_t| ≤ friction · F_n` at each foot",
-        "The robot goes less far, or turns; joints are as they should be.",
+        "The robot walks less far, or turns, while its joints follow the model.",
         "ground_tilt, tether_force"),
     "ground_tilt": Seen(
         "`g = 9.81 m/s² · n/|n|`, `n = (tan forward, tan left, −1)`",
@@ -93,88 +93,88 @@ SEEN: dict[str, Seen] = {
         "tether_force"),
     "joint_compliance": Seen(
         "`τ = stiffness (Δq + 1 ms · dΔq/dt)`, `Δq = q − q_link`",
-        "The link sags with load and swings after steps, where the servo's own sensor is right.",
-        "servo_gain, which sags the same way"),
+        "The link sags under load and oscillates after steps, while the servo's own sensor shows no error.",
+        "servo_gain, which causes the same sag"),
     "joint_stop": Seen(
-        "`lower ≤ q ≤ upper`, or the description's own end where that is nearer",
-        "The curve is cut off flat at an angle.",
-        "dropped_command, where it is met once"),
+        "`lower ≤ q ≤ upper`, or the limit in the robot's description if it is nearer",
+        "The curve is clipped at an angle.",
+        "dropped_command, if it is reached only once"),
     "link_length": Seen(
         "`p = p₀ (1 + change/|p₀|)`, p from the link's joint to the next, or to its foot",
-        "Cameras see two axes at another distance; walks go farther or turn.",
-        "zero_offset of a neighbour, com_shift"),
+        "The distance of two joint axes seen by cameras differs from the model; walks go farther, or turn.",
+        "zero_offset of a neighbouring joint, com_shift"),
     "load_friction": Seen(
         "`τ = −sign(ω) (τ_C + |τ_load| (coefficient + static · exp(−(ω/speed)²) + backdrive))`, the last term only where "
-        "motor torque and ω are opposed",
-        "The error before reversals grows with the load that the joint carries.",
-        "coulomb_friction, under one load"),
+        "motor torque and ω have opposite signs",
+        "The error before reversals increases with the load on the joint.",
+        "coulomb_friction, if the load is always the same"),
     "loose_mount": Seen(
         "the link turns freely by φ about `axis`, `|φ| ≤ play/2`",
         "The link turns about an axis that no servo turns.",
-        "marker_frame, when it lies still"),
+        "marker_frame, if the link does not move in its play"),
     "marker_frame": Seen(
         "`R_seen = R exp([rotation]×)`",
-        "A rigid body's rotations come about turned axes; nothing else changes.",
+        "The rotations of a rigid body are about rotated axes; nothing else changes.",
         "loose_mount, zero_offset"),
     "parallel_spring": Seen(
         "`τ = −stiffness · q`",
-        "The error grows with the angle, load or not (a taut cable).",
+        "The error increases with the angle, independently of the load (a taut cable).",
         "servo_gain, payload"),
     "minimum_duty": Seen(
         "`duty = sign(e) (p₀ + duty + gain · d)` outside the dead zone",
-        "The joint comes closer to its goal before it stops, and may hum there.",
-        "servo_gain, less coulomb_friction"),
+        "The joint gets closer to its goal before it stops, and may oscillate there.",
+        "servo_gain, coulomb_friction below nominal"),
     "payload": Seen(
-        "`m = m₀ + mass`, `c = (m₀ c₀ + mass · position)/m`, the inertia with that of the point",
-        "Joints above it err with gravity and acceleration; walks change.",
-        "com_shift, which has the same moment"),
+        "`m = m₀ + mass`, `c = (m₀ c₀ + mass · position)/m`, inertia including that of the point mass",
+        "Joints that carry it have errors that depend on gravity and acceleration; walks change.",
+        "com_shift with the same moment"),
     "reflected_inertia": Seen(
         "`I = I₀ + inertia`",
-        "Fast motions lag and overshoot; slow ones are right.",
+        "Fast motions lag and overshoot; slow ones match the model.",
         "command_delay, viscous_friction"),
     "servo_gain": Seen(
         "`duty = sign(e) min(1, punch + ratio (1 − punch) d/slope)`, or `clip(ratio · gain · e, −1, 1)`",
-        "Errors under load grow or shrink by a ratio.",
-        "joint_compliance, supply_voltage at one joint"),
+        "Errors under load change by a constant ratio.",
+        "joint_compliance, supply_voltage (if there is only one joint)"),
     "soft_ground": Seen(
         "`F_n = k · depth` at each contact point, `1/k = 1/stiffness + 1/k_ground`",
         "Feet sink in; steps are shorter and softer.",
         "ground_tilt, com_shift"),
     "speed_order": Seen(
         "`speed(k-th bus ID) = speed₀(k-th joint by name)`",
-        "Every joint runs at another joint's speed: right ends, wrong ramps.",
-        "nothing else does this"),
+        "Every joint runs at another joint's speed: the ends of the ramps are right, their slopes wrong.",
+        "no other effect"),
     "stribeck_friction": Seen(
         "`τ = −sign(ω) (τ_C + torque · exp(−(ω/speed)²))`",
-        "A jump when the joint breaks loose; fast motion is right.",
+        "The joint jumps when it breaks loose; fast motion matches the model.",
         "coulomb_friction"),
     "supply_sag": Seen(
-        "`V = max(V₀ − drop · Σ|duty|, 0)`, the sum over all servos; acts on the duty torque",
-        "All joints weaken while many work hard at once.",
-        "supply_voltage, under steady work"),
+        "`V = max(V₀ − drop · Σ|duty|, 0)`, summed over all servos; acts on the duty torque",
+        "All joints are weaker while many of them need high duty at once.",
+        "supply_voltage, if the load is constant"),
     "supply_voltage": Seen(
         "`τ_duty = duty · τ_stall · voltage/V_rated`",
         "All joints are weaker, and slower at full duty.",
         "thermal_fade in short takes, torque_ceiling"),
     "tether_force": Seen(
         "`F_W = force`, at the base link's origin",
-        "The robot is pulled one way, as much at rest as in motion.",
+        "The robot is pulled in one direction, at rest as much as in motion.",
         "ground_tilt"),
     "thermal_fade": Seen(
         "`τ_duty · exp(−rate · t)`",
-        "All joints weaken slowly through a take.",
+        "All joints slowly get weaker during a take.",
         "supply_voltage in short takes"),
     "timing_drift": Seen(
         "pose k is sent at `t_k + k · per_pose`, k from 0",
-        "All joints run later by a step at each pose.",
-        "clock_rate, where all dwells are equal"),
+        "The delay of all joints grows by a step at each pose.",
+        "clock_rate, if all dwells are equal"),
     "torque_ceiling": Seen(
         "`τ_motor = clip(τ_duty − τ_emf, −torque, torque)`",
-        "One joint stalls or lags at its peaks of torque; elsewhere it is right.",
+        "One joint stalls or lags at its torque peaks; elsewhere it matches the model.",
         "supply_voltage, torque_saturation"),
     "torque_saturation": Seen(
         "`τ_motor = x/(1 + |x|/torque)`, `x = τ_duty − τ_emf`",
-        "One joint lags the more, the more torque it needs.",
+        "The lag of one joint increases with the torque that it needs.",
         "torque_ceiling, servo_gain"),
     "viscous_friction": Seen(
         "`τ = −(b₀ + coefficient) ω`",
@@ -182,23 +182,25 @@ SEEN: dict[str, Seen] = {
         "reflected_inertia, command_delay"),
     "zero_offset": Seen(
         "`q_link = q + angle`",
-        "Angles zeroed in neutral hide it; the robot leans, and walks change.",
+        "Not visible in angles zeroed in neutral; the robot leans, and walks change.",
         "link_length, com_shift"),
 }
 LIMITS = {
-    "payload": "Close to com_shift where `mass` is small compared with the link's: `offset = mass (position − c₀)/m`.",
+    "payload": "Close to com_shift if `mass` is small compared with the link's mass: `offset = mass (position − c₀)/m`.",
     "stribeck_friction": "Reduces to coulomb_friction as `speed` goes to infinity.",
 }
-"""How an effect becomes the simpler one that it `reduces_to`."""
+"""How an effect reduces to the simpler one, its `reduces_to`."""
 HEAD = """# Effects
 
-Physics beyond the nominal model, each one file in `workbench/effects/library/`. A `model.yaml` lists them; the verbs that
-simulate, export or move the robot take it as `--model`. Another Drake project loads it with
-`workbench.MakeStation(workbench.load_model("model.yaml"))`. [Adding one](extending.md#an-effect) is one file of your own package.
+An effect is a piece of physics beyond the nominal model, in one file in `workbench/effects/library/`. A `model.yaml` lists the
+effects of a robot; pass it with `--model` to any command that simulates, exports to or moves the robot. In another Drake project,
+load it with `workbench.MakeStation(workbench.load_model("model.yaml"))`. To [add an effect](extending.md#an-effect), write one
+file in your own package.
 
-*Typical* is the size from which an effect is noticeable on a small robot; searches start there. Symbols: q, ω: angle and speed
-of the servo's joint, q_link: angle of its link; τ: torque; e, d, duty, slope, punch: of
-[the servo law](formats.md#4-nominal-servo-law-servoyaml), which gives the duty torque τ_duty, the back-EMF torque τ_emf and the
+*Typical* is the size from which an effect is noticeable on a small robot; searches start there.
+
+Symbols: q, ω: angle and speed of the servo's joint; q_link: angle of its link; τ: torque; e, d, duty, slope, punch: defined by
+[the servo law](formats.md#4-nominal-servo-law-servoyaml), as are the duty torque τ_duty, the back-EMF torque τ_emf, and the
 nominal Coulomb and viscous friction τ_C and b₀; t: time since the first command; m, c: mass and centre of mass of a link;
 F_t, F_n: tangential and normal contact force. Index 0: nominal.
 
@@ -224,7 +226,7 @@ def page() -> str:
 
 
 def meanings() -> dict[str, str]:
-    """By effect, what its parameters mean: the third column of the table in section 7 of docs/formats.md."""
+    """The meaning of the parameters by effect: the third column of the table in section 7 of docs/formats.md."""
     section = FORMATS.read_text(encoding="utf-8").split("\n## 7. Effects\n", 1)[1]
     out = {}
     for line in section.splitlines():
@@ -235,7 +237,7 @@ def meanings() -> dict[str, str]:
 
 
 def _of_one(effect: Effect, meaning: str) -> str:
-    """Of a row for several effects the part of one: parameters of others, and their units, are left out."""
+    """The part of a row for several effects that belongs to one; the other effects' parameters and units are omitted."""
     own = {p.name for p in effect.parameters}
     parts = []
     for part in re.split(r", (?=`)", meaning):

@@ -23,7 +23,7 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.effects.registry import effect_named
 from workbench.files.reading import write_whole
-from workbench.identify.evidence.fit import Fitted, fitting
+from workbench.identify.evidence.fit import Fitted, fit_hypothesis
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, start
 from workbench.identify.evidence.nuisance import uncertain_numbers
 from workbench.identify.evidence.options import EvidenceOptions
@@ -63,9 +63,9 @@ def evidence(out: Path, quick: bool, progress: Callable[[str, float | None], Non
             h = h.with_effect(c, np.ones(c.size))
         s = region.likelihood.discrepancy(rollouts.answers([(0, h)])[0])
         for _ in range(2):
-            region = region.correlated(region.correlation(rollouts.answers([(0, h)])[0]))
+            region = region.with_correlation_time(region.correlation(rollouts.answers([(0, h)])[0]))
             rollouts = replace(rollouts, regions=(region,))
-            fit: Fitted = lockstep(rollouts, {0: fitting(region, OPTIONS, h, s, OPTIONS.iterations)})[0]
+            fit: Fitted = lockstep(rollouts, {0: fit_hypothesis(region, OPTIONS, h, s, OPTIONS.iterations)})[0]
             h, s = fit.hypothesis, fit.discrepancy
         laplace = _laplace(region.likelihood.log(fit.r, s), fit, region.likelihood.precision(fit.r, s))
         sampled, error, count = _sampled(rollouts, h, s, 60 if quick else 200)

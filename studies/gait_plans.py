@@ -20,7 +20,7 @@ from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import binding
 from workbench.gait.machine import GaitMachine
 from workbench.gait.planned import bundled_tasks, table_shape
-from workbench.gait.search import steered
+from workbench.gait.search import steer
 from workbench.gait.space import space_of
 from workbench.gait.trajopt import Task, plan
 from workbench.robot import puppy_model
@@ -40,7 +40,7 @@ def played(machine: GaitMachine, task: Task) -> tuple[Candidate | None, bool, fl
         return None, False, seconds, 0.0
     request = request_of(task)
     evaluator = Evaluator(machine, request, [], n_jobs=1)
-    (walked,) = steered(evaluator, space_of(machine, request), evaluator.judged([table_shape(machine, planned)], 0))
+    (walked,) = steer(evaluator, space_of(machine, request), evaluator.judge([table_shape(machine, planned)], 0))
     return walked, True, seconds, request.progress(walked.nominal) if walked.nominal else 0.0
 
 

@@ -133,9 +133,9 @@ def _did(how: str, take: Take, motion: Motion, model: RobotModel) -> Did:
 
 def markdown(found: list[Row]) -> str:
     """The rows as a table of docs/gaits.md."""
-    head = ("gait", "nominal", "5th percentile of draws", "fell", "heading over draws; after one recorded metre; three "
-            "[deg/m RMS]", "slip, nominal", "MuJoCo: speed kept", "largest tilt, torque", "back to its cycle",
-            "nominal by seed (refused)")
+    head = ("gait", "nominal speed", "5th percentile over random robots", "fell",
+            "heading over random robots: untrimmed, after one recorded metre, after three [deg/m RMS]", "slip, nominal",
+            "speed in MuJoCo", "largest tilt, torque", "returns to its cycle within", "nominal speed by seed (refused)")
     return "\n".join([_row(head), "|" + len(head) * "---|", *(_row(_cells(row)) for row in found)])
 
 

@@ -69,7 +69,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         request = request_of(task)
         evaluator, space = Evaluator(machine, request, []), space_of(machine, request)
         random = [s for s in seeds(machine, request, space, 12 * count, 1) if s.family == task.shape.family][:count]
-        mine, *others = evaluator.judged([planned.shape, *random], 0)
+        mine, *others = evaluator.judge([planned.shape, *random], 0)
         reached = request.progress(mine.nominal) if mine.nominal else 0.0
         theirs = sorted((request.progress(c.nominal) if c.nominal else 0.0) for c in others)
         fell = sum(c.nominal is None or c.nominal.fell for c in others)

@@ -43,9 +43,9 @@ class _Watched(Evaluator):
         super().__init__(machine, request, [])
         self.course: list[tuple[int, float]] = []
 
-    def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
-               ) -> list[Candidate]:
-        out = super().judged(shapes, draws, keep)
+    def judge(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
+              ) -> list[Candidate]:
+        out = super().judge(shapes, draws, keep)
         reached = [self.request.progress(c.nominal) for c in out if c.good and c.nominal]
         self.course.append((self.rollouts, max(reached, default=0.0)))
         return out

@@ -26,7 +26,7 @@ from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.certify import Certified, CertifyOptions, certify
 from workbench.gait.drive.family import GaitFamily, load_family
 from workbench.gait.ensemble import load_ensemble
-from workbench.gait.learning.motion import Policy, learned_shape, walked
+from workbench.gait.learning.motion import Policy, learned_shape, walk_episode
 from workbench.gait.learning.options import LearningOptions
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
@@ -101,7 +101,7 @@ def distances(policy: Policy, family: GaitFamily, robots: list[RobotModel], opti
     domains = GaitEnv(family, robots, "pose", options).domains
     out = []
     for k in range(len(robots)):
-        episode, _ = walked(policy, domains, k)
+        episode, _ = walk_episode(policy, domains, k)
         p = episode.take().p_WB
         assert p is not None
         out.append(float("nan") if episode.fell else float(p[-1, 0]))

@@ -18,7 +18,7 @@ from workbench.compare.comparison import noise_of
 from workbench.compare.session import Session, load_session
 from workbench.compare.session_takes import RegisteredTake, read_takes, register_takes
 from workbench.experiment.design import ObservationModel
-from workbench.experiment.projection import Shown, left_open
+from workbench.experiment.projection import PairChannels, recording_unknowns
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
@@ -126,7 +126,7 @@ class Jury:
         sigma = np.array(list(self.sight.sigma.values()))
         moving = ~take.recorded.resting
         recorded, simulated = (t.q[moving][:, [t.column(j) for j in joints]] / sigma for t in (take.recorded, observed))
-        open_ = left_open(np.nan_to_num(simulated), self.sight)
+        open_ = recording_unknowns(np.nan_to_num(simulated), self.sight)
         known = np.isfinite(recorded) & np.isfinite(simulated)
         weight = known.ravel() / np.sqrt(TOGETHER)
 
@@ -134,8 +134,8 @@ class Jury:
             return np.asarray(weight * np.nan_to_num(y).ravel())
 
         none = np.zeros((known.size, 0))
-        return Shown(flat(recorded), flat(simulated), none, none, np.stack([flat(c) for c in open_], axis=1),
-                     np.zeros(known.size, dtype=int), weight, np.ones(known.size)).closest("b").cost
+        return PairChannels(flat(recorded), flat(simulated), none, none, np.stack([flat(c) for c in open_], axis=1),
+                            np.zeros(known.size, dtype=int), weight, np.ones(known.size)).closest("b").cost
 
     def _job(self, model: RobotModel, t: RegisteredTake) -> Job:
         frames = t.recorded.since_start

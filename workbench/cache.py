@@ -1,4 +1,4 @@
-"""Values that are made once for a key, as far as they are among the latest."""
+"""A cache of the values that were made last."""
 
 from __future__ import annotations
 

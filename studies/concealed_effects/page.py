@@ -36,7 +36,7 @@ def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -
     if bins:
         report.add(Section("How sure, and how often right", [Picture(reliability_figure(bins), (
             "Findings by the confidence that they state. A bar is the 95 % interval (Clopper and Pearson) of the share that is "
-            "true; green where it holds the diagonal. A finding at physics that has no name counts as not true here."))]))
+            "true; green where it contains the diagonal. A finding at physics outside the vocabulary counts as false here."))]))
     if given:
         report.add(Section("Sizes", [Picture(sizes_figure(given), (
             "Each size that was given for an effect that is there, in a row from small to large: error relative to the truth, "
@@ -53,7 +53,7 @@ def headline(asked: Sequence[Criterion], result: Mapping[str, Any]) -> str:
     n, planned = result["diagnosed"], result["planned"]
     if n == 0:
         return f"Nothing is diagnosed yet: 0 of {planned} sessions."
-    met = f"{sum(bool(c.met) for c in asked)} of the {len(asked)} things asked are met"
+    met = f"{sum(bool(c.met) for c in asked)} of the {len(asked)} requirements are met"
     said = f"{met}, over {n} sessions." if n == planned else f"A partial trial, {n} of {planned} sessions: {met} so far."
     return said if result["seed_drawn_by"] == "os.urandom" else said + " The seed was chosen by hand: this is no trial."
 
@@ -69,13 +69,13 @@ def _remarks(result: Mapping[str, Any]) -> str:
     said = [f"{result['quiet']} of the sessions hide nothing, {result['outside']} hide physics outside the vocabulary, "
             f"{result['two_or_more']} hide two effects or more, of which {result['masked']} are masked."]
     if result["named_in_masked"] is not None:
-        said.append(f"In masked sessions {100 * result['named_in_masked']:.0f} % of the effects were named.")
+        said.append(f"In masked sessions {100 * result['named_in_masked']:.0f} % of the effects were identified.")
     if result["gap_closed"] is not None:
-        said.append(f"On takes that no diagnosis saw, the fitted models close {100 * result['gap_closed']:.0f} % of the gap "
+        said.append(f"On held-out takes, the fitted models close {100 * result['gap_closed']:.0f} % of the gap "
                     "(median).")
     said.append(f"False alarms in sessions that do hide something: {result['false_alarms_elsewhere']}.")
     if result["failed"]:
-        said.append(f"Failed diagnoses: {result['failed']}; all that they should have named counts as missed.")
+        said.append(f"Failed diagnoses: {result['failed']}; all effects hidden in them count as missed.")
     if len(result["code"]) > 1:
         by = ", ".join(f"{n} by {code}" for code, n in result["code"].items())
         said.append(f"**The workbench changed during the trial**: {by}.")
@@ -84,7 +84,7 @@ def _remarks(result: Mapping[str, Any]) -> str:
 
 def _key_numbers(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     numbers = [("sessions", f"{result['diagnosed']} of {result['planned']}", f"{result['failed']} failed")]
-    numbers += [(c["what"].split(",")[0] if i == 0 else "placed right", f"{100 * c['value']:.0f} %", c["asked"])
+    numbers += [(c["what"].split(",")[0] if i == 0 else "at the right joint or link", f"{100 * c['value']:.0f} %", c["asked"])
                 for i, c in enumerate(result["criteria"][:2]) if c["value"] is not None]
     if result["seconds"] is not None:
         memory = result["memory"]["most"] / 1e9

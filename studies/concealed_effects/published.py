@@ -66,13 +66,13 @@ def section(result: Mapping[str, Any] | None) -> str:
     partial = "" if n == planned else f"**Partial: {n} of {planned} sessions.** "
     seconds = result["seconds"]
     said = (f"{partial}{n} sessions: {result['quiet']} quiet, {result['outside']} outside the vocabulary, "
-            f"{result['two_or_more']} with two effects or more, of which {result['masked']} masked; "
+            f"{result['two_or_more']} with two effects or more, of which {result['masked']} are masked; "
             f"failed diagnoses: {result['failed']}. ")
     if seconds is not None:
         said += (f"A diagnosis took {seconds['median'] / 60:.1f} minutes (median; longest {seconds['most'] / 60:.1f}) and at "
                  f"most {result['memory']['most'] / 1e9:.1f} GB. ")
     if result["gap_closed"] is not None:
-        said += f"The models close {100 * result['gap_closed']:.0f} % of the gap on unseen takes (median). "
+        said += f"The models close {100 * result['gap_closed']:.0f} % of the gap on held-out takes (median). "
     said += _surest(scores) + _by_version(scores)
     drawn = "the operating system" if result["seed_drawn_by"] == "os.urandom" else "hand: this is no trial"
     said += f"Seed drawn by {drawn}; seal {result['sha256_of_all'][:16]}. Every session: concealed_effects/results/trial.json."
@@ -81,7 +81,7 @@ def section(result: Mapping[str, Any] | None) -> str:
 
 def _effects(scores: Sequence[Score]) -> list[str]:
     """A row for each effect that was hidden."""
-    rows = ["| hidden effect | sessions | identified | in a tie of two | at the right place | error of the size, median |",
+    rows = ["| hidden effect | sessions | identified | in a tie of two | at the right joint or link | median error of the size |",
             "|---|---|---|---|---|---|"]
     for e in by_effect(scores):
         placed = "–" if e.placed is None else f"{100 * e.placed:.0f} %"

@@ -111,16 +111,16 @@ def criteria(scores: Sequence[Score]) -> list[Criterion]:
     median = float(np.median([p.error for p in given])) if given else None
     return [
         _share("effects identified, exactly or as one of a tie of two", "at least 90 %", hits, len(effects), 0.90, 1.0),
-        Criterion("of those, placed right", "at least 95 %", _mean(shares),
+        Criterion("of those, at the right joint or link", "at least 95 %", _mean(shares),
                   f"{100 * sum(shares) / len(shares):.0f} % of {len(shares)}" if shares else "–",
                   bool(np.mean(shares) >= 0.95) if shares else None),
         _none("false alarms in quiet sessions", alarms, len(quiet), "in {} sessions"),
-        _none("sessions with physics outside the vocabulary called explained", explained, len(outside), "of {}"),
-        Criterion("bins of confidence whose 95 % interval holds the diagonal", "all", held / len(bins) if bins else None,
+        _none("out-of-vocabulary sessions reported as explained", explained, len(outside), "of {}"),
+        Criterion("confidence bins whose 95 % interval contains the diagonal", "all", held / len(bins) if bins else None,
                   f"{held} of {len(bins)}", held == len(bins) if bins else None),
-        _share("90 % intervals that cover the true size", "85 to 95 %", inside, len(given), 0.85, 0.95),
-        Criterion("median relative error of sizes", "at most 15 %", median, "–" if median is None else f"{100 * median:.0f} %",
-                  None if median is None else median <= 0.15),
+        _share("90 % intervals that contain the true size", "85 to 95 %", inside, len(given), 0.85, 0.95),
+        Criterion("median relative error of the sizes", "at most 15 %", median,
+                  "–" if median is None else f"{100 * median:.0f} %", None if median is None else median <= 0.15),
     ]
 
 

@@ -7,7 +7,7 @@ from tests.firmware.image import IDS, Robot, needs_compiler
 from workbench.device.bus import Bus, BusError, NoAnswerError
 from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
 from workbench.device.bus.survey import survey
-from workbench.device.link import FrameType, frame
+from workbench.device.link import FrameType, encode_frame
 from workbench.device.virtual.cm530.port import PcLinkPort
 from workbench.robot import puppy_model
 from workbench.robot.servo_profile_file import servo_profile
@@ -17,7 +17,7 @@ def bridged() -> tuple[Robot, PcLinkPort, Bus]:
     """A robot whose controller is a bridge, the port that leads to it, and the servos' bus over that."""
     r = Robot()
     r.run(300)
-    r.board.send(r.board.pc, frame(FrameType.RELEASE))
+    r.board.send(r.board.pc, encode_frame(FrameType.RELEASE))
     r.run(100)
     port = PcLinkPort(r.board)
     enter_bridge(port)

@@ -12,7 +12,7 @@ from tests.firmware.native import Sim, walk
 from tests.rude.core_port import CorePort
 from workbench.device.bus import BusError
 from workbench.device.controller.play import ControllerRun, play_by_controller
-from workbench.device.link import FrameType, frame
+from workbench.device.link import FrameType, encode_frame
 from workbench.device.tables.table_file import JointBounds, TableFile, bounds_of
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
@@ -105,7 +105,7 @@ def test_a_second_ctrl_c_releases_at_once(tmp_path: Path) -> None:
 
 def test_a_refused_table_moves_nothing(tmp_path: Path) -> None:
     w = Watched()
-    w.port.writePort(frame(FrameType.RELEASE))
+    w.port.writePort(encode_frame(FrameType.RELEASE))
     w.port.run(100)
     with pytest.raises(BusError, match="the table is refused: bounds"):
         w.play(tmp_path, joints=(replace(BOUNDS[0], low=0, high=1023), *BOUNDS[1:]))

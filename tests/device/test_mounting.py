@@ -133,15 +133,15 @@ def test_answers_become_the_keys_that_put_it_right():
     answers = Answers()
     for joint, answer in (("one", ""), ("two", "three -"), ("three", "two")):
         answers.take(joint, answer, ids)
-    assert answers.corrected(ids, {}) == {"bus_ids": {"one": 1, "three": 2, "two": 3}, "direction": {"three": -1}}
+    assert answers.corrections(ids, {}) == {"bus_ids": {"one": 1, "three": 2, "two": 3}, "direction": {"three": -1}}
     turned = Answers()
     turned.take("two", "-", ids)
-    assert turned.corrected(ids, {"two": Mounting(-1), "one": Mounting(-1)}) == {"direction": {"one": -1}}
+    assert turned.corrections(ids, {"two": Mounting(-1), "one": Mounting(-1)}) == {"direction": {"one": -1}}
     twice = Answers()
     twice.take("one", "two", ids)
     twice.take("two", "two", ids)
     with pytest.raises(InputError, match="one joint moved for several servos"):
-        twice.corrected(ids, {})
+        twice.corrections(ids, {})
 
 
 def test_a_model_file_keeps_mountings(tmp_path):

@@ -12,10 +12,11 @@ import pandas as pd
 import pytest
 
 from tests.command import main
-from workbench.compare.logged import how_logged
+from workbench.compare.logged import describe_logging
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.files.resources import resource_dir
+from workbench.files.yaml_file import read_yaml, yaml_text
 from workbench.view.report.words import said_aside
 
 COUNT = 360 / 4096
@@ -57,10 +58,13 @@ def _session(folder: Path, spoil: Callable[[Rows], None]) -> Path:
 @pytest.mark.parametrize(("spoil", "said"), FAULTS)
 def test_what_was_set_aside_is_part_of_the_provenance(tmp_path: Path, spoil: Callable[[Rows], None], said: str) -> None:
     takes = read_takes(load_session(_session(tmp_path, spoil)))[0]
-    found = how_logged(takes)
+    found = describe_logging(takes)
     assert list(found["set_aside"]) == ["slow"]
     (sentence,) = said_aside(found)
     assert sentence.startswith(f"Corrected or excluded in slow: {said}")
+    written = tmp_path / "model.yaml"  # model.yaml has the provenance, too
+    written.write_text(yaml_text(found), encoding="utf-8")
+    assert read_yaml(written)["set_aside"] == found["set_aside"]
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tests.inputs.corpus import ROBOT
 from workbench.dynamics.machine import Machine
 from workbench.dynamics.torque_gap import torque_gap
 from workbench.dynamics.torque_log import TorqueLog, is_torque_log, read_torque_log
-from workbench.dynamics.trajectory import smoothed
+from workbench.dynamics.trajectory import smooth
 from workbench.files import InputError
 from workbench.robot import EffectSpec, RobotModel, puppy_model
 
@@ -31,7 +31,7 @@ def _log(model: RobotModel, mass: float, friction: float) -> TorqueLog:
     time = np.arange(1200) / 200
     q = np.column_stack([0.6 * np.sin(1.7 * time), 0.4 + 0.7 * np.sin(2.9 * time)])
     level = np.tile([1.0, 0, 0, 0], (len(time), 1))
-    path = smoothed(time, model.joints, q, np.zeros((len(time), 3)), level, 0.1)[0]
+    path = smooth(time, model.joints, q, np.zeros((len(time), 3)), level, 0.1)[0]
     loaded = model.with_effect(EffectSpec("payload", ("shank",), {"mass": mass, "position": (0.0, 0.0, -0.09)}))
     torque = Machine(loaded).demand(path)[1]
     torque[:, 0] += friction * np.sign(path.v[:, 0])

@@ -1,4 +1,4 @@
-"""Effects that change the robot's build, against closed forms on a one-joint rig and a small arm, and on the puppy."""
+"""Effects that change the robot's structure, against closed forms on a one-joint rig and a small arm, and on the puppy."""
 
 from __future__ import annotations
 
@@ -550,7 +550,7 @@ def test_backlash_explains_another_engines_recording_of_it():
     ("link_length", "base", {"change": 0.01}, "has no joint"),
     ("link_length", "upper", {"change": -0.15}, "cannot change by -0.15"),
     ("link_length", "a", {"change": 0.01}, "'a' is not a link"),
-    ("payload", "hand", {"mass": 0.1, "position": 0.2}, "'position' is three numbers"),
+    ("payload", "hand", {"mass": 0.1, "position": 0.2}, "'position': expected three numbers"),
     ("payload", "hand", {"mass": -0.1, "position": (0.0, 0.0, 0.0)}, "expected 0 to 5"),
     ("com_shift", "nowhere", {"offset": (0.0, 0.0, 0.0)}, "the robot has no 'nowhere'"),
 ])
@@ -562,7 +562,7 @@ def test_impossible_places_and_values_are_named(arm, effect, where, parameters, 
 def test_a_link_without_mass_or_end_is_named(rig, tmp_path):
     with pytest.raises(InputError, match="'base' has no <inertial>"):
         physics_of(with_effects(rig, ("payload", "base", {"mass": 0.1, "position": (0.0, 0.0, 0.0)})))
-    with pytest.raises(InputError, match="ends in neither"):
+    with pytest.raises(InputError, match="expected a joint or a collision shape at its end"):
         physics_of(with_effects(rig, ("link_length", "arm", {"change": 0.01})))
 
 
@@ -580,16 +580,16 @@ def test_a_urdf_takes_effects_as_an_sdf_does(tmp_path):
     ("backlash", "flm", {"gap": 3.12}, "flm has 3.1 deg of free play between servo and link."),
     ("joint_compliance", "flm", {"stiffness": 8.0}, "flm is coupled to its servo with a stiffness of 8.0 N m/rad."),
     ("loose_mount", "flm", {"play": 2.0, "axis": (1.0, 0.0, 0.0)},
-     "The link of flm is loose: it rocks by 2.0 deg about (1.00, 0.00, 0.00), across its servo's axis."),
+     "The link of flm is loose: it rocks by 2.0 deg about (1.00, 0.00, 0.00), which is not the servo's axis."),
     ("joint_stop", "flm", {"lower": -20.0, "upper": 30.0}, "flm goes no lower than -20.0 deg and no higher than 30.0 deg."),
     ("joint_stop", "flm", {"lower": -180.0, "upper": 12.56}, "flm goes no higher than 12.6 deg."),
-    ("parallel_spring", "tail", {"stiffness": 0.2}, "Something pulls tail back to neutral with 0.20 N m/rad."),
-    ("link_length", "flb_link", {"change": -0.004}, "flb_link is 4.0 mm shorter than drawn."),
+    ("parallel_spring", "tail", {"stiffness": 0.2}, "tail is pulled back to neutral with 0.20 N m/rad, as if by a taut cable."),
+    ("link_length", "flb_link", {"change": -0.004}, "flb_link is 4.0 mm shorter than in the model."),
     ("payload", "body_link", {"mass": 0.05, "position": (0.01, 0.0, -0.02)},
-     "body_link carries 50 g more, at (10, 0, -20) mm in its frame."),
+     "body_link carries an additional 50 g at (10, 0, -20) mm in its frame."),
     ("com_shift", "tail_link", {"offset": (0.005, 0.0, 0.0)},
-     "The centre of mass of tail_link is (5.0, 0.0, 0.0) mm off the model's, in its frame."),
-    ("marker_frame", "FLtop", {"rotation": (1.0, 2.0, 3.0)}, "The frame of FLtop is turned by (1.0, 2.0, 3.0) deg."),
+     "The centre of mass of tail_link is displaced by (5.0, 0.0, 0.0) mm in the link's frame."),
+    ("marker_frame", "FLtop", {"rotation": (1.0, 2.0, 3.0)}, "The marker frame of FLtop is rotated by (1.0, 2.0, 3.0) deg."),
 ])
 def test_sentences(name, where, parameters, sentence):
     effect, spec = known_effects()[name], EffectSpec(name, (where,), parameters)

@@ -6,9 +6,9 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.evidence.linear import candidate
 from tests.evidence.test_search import OPTIONS, robot, searched
-from workbench.identify.evidence.fit import fitting, regressed
+from workbench.identify.evidence.fit import fit_hypothesis, regress
 from workbench.identify.evidence.hypothesis import Prior, log_odds
-from workbench.identify.evidence.nested import told_from_nothing
+from workbench.identify.evidence.nested import improbable_effects
 from workbench.identify.evidence.search import lockstep
 
 
@@ -20,8 +20,8 @@ def refuted(rollouts, names: dict[str, float]):
     for name, size in names.items():
         c = candidate(name)
         h = h.with_effect(c, [size] + [0.0] * (c.size - 1))
-    fit = lockstep(after, {0: fitting(found.region, OPTIONS, h, best.discrepancy, OPTIONS.iterations)})[0]
-    said = lockstep(after, {0: told_from_nothing(found.region, OPTIONS, fit)})[0]
+    fit = lockstep(after, {0: fit_hypothesis(found.region, OPTIONS, h, best.discrepancy, OPTIONS.iterations)})[0]
+    said = lockstep(after, {0: improbable_effects(found.region, OPTIONS, fit)})[0]
     return {c.name: why.behind for c, why in said.items()}
 
 
@@ -42,9 +42,9 @@ def test_the_ratio_is_that_of_the_densities_at_zero():
     for name in ("parallel_spring", "backlash"):
         c = candidate(name)
         h = h.with_effect(c, [0.01] + [0.0] * (c.size - 1))
-    fit = lockstep(after, {0: fitting(found.region, OPTIONS, h, found.best.discrepancy, OPTIONS.iterations)})[0]
-    said = lockstep(after, {0: told_from_nothing(found.region, OPTIONS, fit)})[0]
-    fit = lockstep(after, {0: regressed(found.region, OPTIONS, fit)})[0]
+    fit = lockstep(after, {0: fit_hypothesis(found.region, OPTIONS, h, found.best.discrepancy, OPTIONS.iterations)})[0]
+    said = lockstep(after, {0: improbable_effects(found.region, OPTIONS, fit)})[0]
+    fit = lockstep(after, {0: regress(found.region, OPTIONS, fit)})[0]
     covariance, prior = fit.covariance(found.region, OPTIONS), Prior.of(fit.hypothesis, OPTIONS)
     assert said
     for c, own in zip(fit.hypothesis.effects, fit.hypothesis.slices()):

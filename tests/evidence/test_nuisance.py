@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.evidence.linear import candidate
+from tests.evidence.linear import JOINT, candidate
 from tests.servo_rig import rig_model
 from workbench.effects.base import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
-from workbench.identify.evidence.hypothesis import Uncertain, start
-from workbench.identify.evidence.nuisance import recalibrated, uncertain_numbers
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain, start
+from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
-from workbench.identify.evidence.recalibration import what_changed
+from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.parameters import Candidate
 from workbench.robot import ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
@@ -65,15 +65,15 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     for name, number in numbers.items():
         if name == "zero":
             continue
-        changed = recalibrated(model, {number: 2.0}).servo("j")
+        changed = recalibrate(model, {number: 2.0}).servo("j")
         for other in numbers:
             if other != "zero":
                 factor = np.exp(2.0 * number.sd) if other == name else 1.0
                 assert getattr(changed, other) == pytest.approx(factor * getattr(servo, other)), (name, other)
-    turned = recalibrated(model, {numbers["zero"]: -1.0})
+    turned = recalibrate(model, {numbers["zero"]: -1.0})
     assert turned.effects[0].effect == "zero_offset"
     assert turned.effects[0].parameters["angle"] == pytest.approx(-np.degrees(numbers["zero"].sd))
-    (said, other) = what_changed(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
+    (said, other) = list_changes(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
     assert (said.number, other.number) == ("back_emf", "coulomb_friction")
     assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
 
@@ -154,3 +154,12 @@ def test_ends_that_registers_set_refute_nothing():
     h = start(()).with_effect(held, held.bounds()[1])
     assert not at_their_end(h, [gain])
     assert at_their_end(h, [held])
+
+
+def test_every_number_of_the_law_that_an_effect_changes_too_is_paired_with_it():
+    """Their sum alone is seen, of a zero as of a friction."""
+    numbers = (Uncertain(JOINT, "coulomb_friction", 0.2), Uncertain(JOINT, ZERO, 0.02))
+    at = start(numbers)
+    for name, first in (("coulomb_friction", 0), ("zero_offset", 1)):
+        assert at.with_effect(candidate(name), np.array([1.0])).alike() == [[first, 2]], name
+    assert at.with_effect(candidate("backlash"), np.array([1.0])).alike() == []

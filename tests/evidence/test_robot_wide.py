@@ -103,7 +103,7 @@ def test_evidence_of_all_together_is_that_of_one_region_with_all_numbers():
     """The Schur complement of the joints, compared with the determinant of the whole information matrix."""
     rollouts, states = recalibrate_nominal(robot({}, {"supply_sag": 2.0}), OPTIONS, lambda what, share=None: None)
     whole = Whole(rollouts, tuple(candidate(n) for n in ALL), OPTIONS)
-    fit = whole.fitted(whole.predicted(whole.start([f.best for f in states])))
+    fit = whole.fit(whole.predict(whole.start([f.best for f in states])))
     parts = [(f, G, r.likelihood.precision(f.r, f.discrepancy)) for f, G, r in zip(fit.fits, fit.slopes, whole.regions)]
     k = len(parts[0][0].hypothesis.theta)
     H = np.zeros((JOINTS * k + 1, JOINTS * k + 1))

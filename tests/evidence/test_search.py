@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import FRAME, Linear, candidate, linear, region
-from workbench.identify.evidence.fit import fitting, regressed
-from workbench.identify.evidence.holdout import vetoed
+from workbench.identify.evidence.fit import fit_hypothesis, regress
+from workbench.identify.evidence.holdout import veto
 from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import posterior_of
@@ -117,8 +117,8 @@ def test_takes_kept_back_speak_against_what_only_some_show():
     h = start(found.region.numbers)
     for name in ("load_friction", "backlash"):
         h = h.with_effect(candidate(name), np.ones(1))
-    with_both = lockstep(after, {0: fitting(found.region, OPTIONS, h, 0.01, OPTIONS.iterations)})[0]
-    said = lockstep(after, {0: vetoed(found.region, OPTIONS, with_both, [(0,), (1,), (2,), (3,)])})[0]
+    with_both = lockstep(after, {0: fit_hypothesis(found.region, OPTIONS, h, 0.01, OPTIONS.iterations)})[0]
+    said = lockstep(after, {0: veto(found.region, OPTIONS, with_both, [(0,), (1,), (2,), (3,)])})[0]
     assert {c.name for c in said} == {"backlash"}
 
 
@@ -139,10 +139,10 @@ def test_two_numbers_that_do_the_same_are_not_told_apart_by_sticking():
     does[NUMBER] = 0.5 * does["coulomb_friction.torque"]
     rollouts = replace(rollouts, does=does, sticks=1e-3)
     (of,) = rollouts.regions
-    of = of.correlated(0.2)
+    of = of.with_correlation_time(0.2)
     h = start(of.numbers).with_effect(candidate("coulomb_friction"), np.array([2.0]))
-    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
-    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    fit = lockstep(rollouts, {0: fit_hypothesis(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regress(of, OPTIONS, fit)})[0]
     by_differences, by_moves = (np.sqrt(np.diag(f.covariance(of, OPTIONS)))[1] for f in (fit, again))
     assert by_moves == pytest.approx(0.5, rel=0.2)  # what is believed of the number, as the effect does twice as much
     assert by_differences < 0.5 * by_moves
@@ -156,10 +156,10 @@ def test_an_effect_that_is_a_number_of_the_law_is_not_told_from_it_by_how_far_ea
     bent = does + 0.2 * np.abs(does)
     friction = Uncertain(of.joints[0], "coulomb_friction", 0.5)
     rollouts = replace(rollouts, does={**rollouts.does, "coulomb_friction": 0.5 * bent})
-    of = replace(of, numbers=(friction,)).correlated(FRAME)
+    of = replace(of, numbers=(friction,)).with_correlation_time(FRAME)
     h = start(of.numbers).with_effect(candidate("coulomb_friction"), np.array([2.0]))
-    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
-    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    fit = lockstep(rollouts, {0: fit_hypothesis(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regress(of, OPTIONS, fit)})[0]
     known = [np.sqrt(np.diag(f.covariance(of, OPTIONS)))[1] for f in (fit, again)]
     assert known[1] == pytest.approx(0.5, rel=0.2)  # what is believed of the number, as the effect does twice as much
     assert known[0] < 0.5 * known[1]
@@ -169,8 +169,8 @@ def test_slopes_by_moves_are_those_by_differences_where_nothing_sticks():
     rollouts = robot({"backlash": 1.5})
     (of,) = rollouts.regions
     h = start(of.numbers).with_effect(candidate("backlash"), np.array([1.5]))
-    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
-    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    fit = lockstep(rollouts, {0: fit_hypothesis(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regress(of, OPTIONS, fit)})[0]
     slopes = np.column_stack([-rollouts.does[NUMBER], -rollouts.does["backlash.gap"]])
     np.testing.assert_allclose(again.J, slopes, atol=1e-9)
     np.testing.assert_allclose(again.covariance(of, OPTIONS), replace(fit, J=slopes).covariance(of, OPTIONS), rtol=1e-6)

@@ -8,9 +8,9 @@ import pytest
 from tests.servo_rig import rig_model
 from workbench.files import InputError
 from workbench.identify.evidence.hypothesis import Uncertain
-from workbench.identify.evidence.nuisance import mixing, recalibrated, uncertain_numbers, uncertain_since, widened, with_known
+from workbench.identify.evidence.nuisance import mixing, recalibrate, uncertain_numbers, uncertain_since, widen, with_known
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.evidence.recalibration import what_changed
+from workbench.identify.evidence.recalibration import list_changes
 from workbench.robot import ServoConstants, load_model
 from workbench.robot.model_file import save_model
 from workbench.robot.servo_constants import servo_constants
@@ -57,18 +57,18 @@ def test_numbers_move_together_in_the_robot(tmp_path):
     model = rig_model(tmp_path, ServoConstants())
     both = Uncertain("j", "torque_at_full_duty", 0.2, (("coulomb_friction", -0.1), ("zero", 0.01)))
     friction, zero = Uncertain("j", "coulomb_friction", 0.3), Uncertain("j", "zero", 0.02)
-    moved = recalibrated(model, {both: 1.0, friction: 1.0, zero: -1.0})
+    moved = recalibrate(model, {both: 1.0, friction: 1.0, zero: -1.0})
     assert moved.servo("j").torque_at_full_duty == pytest.approx(model.servo("j").torque_at_full_duty * math.exp(0.2))
     assert moved.servo("j").coulomb_friction == pytest.approx(model.servo("j").coulomb_friction * math.exp(0.2))
     assert moved.effects[0].parameters["angle"] == pytest.approx(math.degrees(-0.01))
-    said = {r.number: r for r in what_changed(model, {both: 1.0, friction: 1.0, zero: -1.0})}
+    said = {r.number: r for r in list_changes(model, {both: 1.0, friction: 1.0, zero: -1.0})}
     assert said["coulomb_friction"].sigmas * said["coulomb_friction"].sd == pytest.approx(
         moved.servo("j").coulomb_friction - model.servo("j").coulomb_friction)
     assert said["coulomb_friction"].sd == pytest.approx(math.hypot(0.1, 0.3) * model.servo("j").coulomb_friction)
 
 
 def test_what_the_data_do_not_tell_is_widened_no_further_than_before():
-    C = widened(np.diag([1.0, 0.01**2, 0.5]), 3.0)
+    C = widen(np.diag([1.0, 0.01**2, 0.5]), 3.0)
     assert np.sqrt(np.diag(C)) == pytest.approx([1.0, 0.03, math.sqrt(0.9)], rel=1e-2)
 
 

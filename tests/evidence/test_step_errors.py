@@ -6,7 +6,7 @@ import pytest
 from tests.evidence.linear import FRAME
 from workbench import load_session
 from workbench.compare.session_takes import read_takes
-from workbench.identify.evidence.step_errors import StepErrors, extrapolated
+from workbench.identify.evidence.step_errors import StepErrors, extrapolate
 from workbench.identify.options import PROBLEM
 from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import SimulationConfig
@@ -43,7 +43,7 @@ def test_of_an_arm_with_more_friction_a_tenth_of_the_error_is_left(which):
     worn = session.model.with_effect(EffectSpec("coulomb_friction", ("elbow",), {"torque": 0.12}))
     nominal = {step: angles(take, session.model, step) for step in (2e-3, 1e-3, 5e-4)}
     right = angles(take, worn, 6.25e-5)
-    wrong = nominal[2e-3] - extrapolated(nominal[1e-3], nominal[5e-4])
+    wrong = nominal[2e-3] - extrapolate(nominal[1e-3], nominal[5e-4])
     raw = angles(take, worn, 2e-3)
     before, after = (np.sqrt(np.square(x - right).mean()) for x in (raw, raw - wrong))
     assert before > np.radians(0.04)  # as much as the log's noise

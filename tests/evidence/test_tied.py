@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import JOINT, candidate, region
-from workbench.identify.evidence.fit import judged
+from workbench.identify.evidence.fit import evaluate
 from workbench.identify.evidence.hypothesis import Prior, Uncertain, log_odds, start
 from workbench.identify.evidence.linearise import extensions
 from workbench.identify.evidence.options import EvidenceOptions
@@ -27,7 +27,7 @@ def fitted(sd, size, alike=1.0, name="ground_tilt"):
     does = 0.1 * (np.sqrt(alike) * torque + np.sqrt(1 - alike) * other)
     h = start(here.numbers).with_effect(tilt, np.r_[size, np.zeros(tilt.size - 1)])
     J = np.column_stack([sd * torque, does, *np.zeros((tilt.size - 1, N))])
-    return here, judged(here, OPTIONS, h, 1e-3 * rng.normal(size=N), J), tilt
+    return here, evaluate(here, OPTIONS, h, 1e-3 * rng.normal(size=N), J), tilt
 
 
 def test_what_the_motors_tolerance_covers_is_no_load():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import JOINT, Linear, candidate, region
-from workbench.identify.evidence.fit import fitting, regressed
+from workbench.identify.evidence.fit import fit_hypothesis, regress
 from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.posterior import posterior_of
@@ -43,10 +43,10 @@ def found(log_ratio, sd, options=OPTIONS, loaded=1.0):
     does |= {f"{c.name}.{c.parameters[0].name}": -SHIFT * gravity for c in names[:2]}
     truth = -log_ratio * torque + 1e-3 * rng.normal(size=1600)
     rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=truth, does=does)
-    fit = lockstep(rig, {0: fitting(here, options, start(here.numbers), 0.1, 2 * options.iterations)})[0]
+    fit = lockstep(rig, {0: fit_hypothesis(here, options, start(here.numbers), 0.1, 2 * options.iterations)})[0]
     fits = lockstep(rig, {0: fits_of_tie(here, options, fit)})[0]
     if fits is not None:
-        again = [lockstep(rig, {0: regressed(here, options, g)})[0] for g in (fits.torque, *fits.names)]
+        again = [lockstep(rig, {0: regress(here, options, g)})[0] for g in (fits.torque, *fits.names)]
         fits = TieFits(again[0], tuple(again[1:]))
     return here, fit, fits
 
@@ -133,9 +133,9 @@ def turned_by(names, alike):
                                               for c in pool}
     rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=4.0 * SHIFT * turned, does=does)
     plain = start(here.numbers)
-    bare = lockstep(rig, {0: fitting(here, OPTIONS, plain, 0.1, 9)})[0]
+    bare = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, plain, 0.1, 9)})[0]
     assert lockstep(rig, {0: fits_of_tie(here, OPTIONS, bare)})[0] is None
-    fit = lockstep(rig, {0: fitting(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
+    fit = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
     ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
     return gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), ties)
 
@@ -170,9 +170,9 @@ def test_a_law_that_was_distorted_for_want_of_an_effect_is_not_the_only_start():
     does = {"torque_at_full_duty": 0.5 * turned} | {f"{c.name}.{c.parameters[0].name}": SHIFT * turned for c in pool}
     rig = Stuck(None, None, (here,), (start(here.numbers),), None, None, truth=4.0 * SHIFT * turned, does=does)
     plain = start(here.numbers)
-    bare = lockstep(rig, {0: fitting(here, OPTIONS, plain, 0.1, 9)})[0]
+    bare = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, plain, 0.1, 9)})[0]
     assert bare.hypothesis.z[0] > 2.0
-    fit = lockstep(rig, {0: fitting(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
+    fit = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, plain.with_effect(pool[0], np.ones(pool[0].size)), 0.1, 9)})[0]
     ties = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
     assert {g.hypothesis.effects[0].name for g in ties.names} == {"ground_tilt", "zero_offset"}
     assert max(g.discrepancy for g in ties.names) < 0.1 * bare.discrepancy

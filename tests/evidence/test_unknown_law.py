@@ -116,13 +116,13 @@ def test_groups_whose_weights_are_all_zero_are_no_part_of_a_law():
     _, found, _ = weighed(robot({}, WEIGHTS))
     f = found.best
     both = f.hypothesis.law.at(WEIGHTS, {"angle": 0.03, "speed": 0.03})
-    beside = np.arange(2.0 * both.active.sum()).reshape(2, -1)
-    kept = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both), beside=beside))
+    law_slopes = np.arange(2.0 * both.active.sum()).reshape(2, -1)
+    kept = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both), law_slopes=law_slopes))
     assert dict(kept.hypothesis.law.scales) == {"angle": 0.03}
-    np.testing.assert_array_equal(kept.beside, beside[:, :5])
-    nothing = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both.at(0.0 * WEIGHTS)), beside=beside))
+    np.testing.assert_array_equal(kept.law_slopes, law_slopes[:, :5])
+    nothing = without_zero_groups(replace(f, hypothesis=replace(f.hypothesis, law=both.at(0.0 * WEIGHTS)), law_slopes=law_slopes))
     assert nothing.hypothesis.law is None
-    assert nothing.beside is None
+    assert nothing.law_slopes is None
     assert without_zero_groups(kept) is kept
 
 

@@ -9,7 +9,7 @@ from workbench.device.tables.limits import check_limits
 from workbench.experiment.design import Experiment, ObservationModel, Separation, design_experiment
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, Path, gravity_torque, long_runs
-from workbench.experiment.projection import Shown
+from workbench.experiment.projection import PairChannels
 from workbench.experiment.rivals import Pair
 from workbench.experiment.segment import join
 from workbench.experiment.stance import BodyMoves
@@ -94,8 +94,8 @@ def test_the_body_goes_down_and_the_feet_stay(puppy, arm):
 
 def shown(a, b, of_a, of_b):
     n = len(a)
-    return Shown(np.array(a, float), np.array(b, float), np.array(of_a, float), np.array(of_b, float), np.zeros((n, 0)),
-                 np.zeros(n, dtype=int), np.ones(n), np.ones(n))
+    return PairChannels(np.array(a, float), np.array(b, float), np.array(of_a, float), np.array(of_b, float), np.zeros((n, 0)),
+                        np.zeros(n, dtype=int), np.ones(n), np.ones(n))
 
 
 def test_a_difference_that_a_rival_can_imitate_does_not_count():
@@ -107,7 +107,7 @@ def test_a_difference_that_a_rival_can_imitate_does_not_count():
     assert end.x == pytest.approx([x])
     assert end.left == pytest.approx([30 - 30 * x, 40])
     assert show.chi_squared() == end.cost == pytest.approx((30 - 30 * x) ** 2 + 1600 + x**2)
-    both = Shown.join([show, shown([0, 0], [0, 0], np.zeros((2, 0)), [[300], [0]])])
+    both = PairChannels.join([show, shown([0, 0], [0, 0], np.zeros((2, 0)), [[300], [0]])])
     assert both.chi_squared() > 2480, "what imitates in one piece gives itself away in the next"
 
 

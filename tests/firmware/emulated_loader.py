@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from workbench.device.controller.loader_profile import LoaderProfile
-from workbench.device.link import FrameType, frame
+from workbench.device.link import FrameType, encode_frame
 
 SETTLE = 0.5
 """Silence after which the loader takes the received bytes for the whole image [s]. The real one's rule is not known."""
 
 
-POWERED_ON = frame(FrameType.STATE, bytes([0, 0, 0, 0, 2, 1, 255, 1, 0, 0, 111, 0]))
+POWERED_ON = encode_frame(FrameType.STATE, bytes([0, 0, 0, 0, 2, 1, 255, 1, 0, 0, 111, 0]))
 """What our program says first after power-on."""
 
 

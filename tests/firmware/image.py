@@ -12,7 +12,7 @@ import pytest
 
 from tests.firmware.native import walk
 from workbench.device import decode_table
-from workbench.device.link import FrameReader, Message, message
+from workbench.device.link import FrameReader, Message, decode_message
 from workbench.device.virtual import AX12A, MILLISECOND, SECOND, Clock, RampBody, ServoBus, VirtualServo, bit_flips
 from workbench.device.virtual.cm530 import Board
 from workbench.robot import BUS_IDS
@@ -89,7 +89,7 @@ class Robot:
     def messages(self) -> list[Message]:
         new = bytes(self.board.pc.received[self._read:])
         self._read += len(new)
-        return [m for f in self._reader.feed(new) if (m := message(f)) is not None]
+        return [m for f in self._reader.feed(new) if (m := decode_message(f)) is not None]
 
     def to_neutral(self) -> list[Message]:
         """Until it holds neutral."""

@@ -9,7 +9,7 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from workbench.device.link import FrameReader, Message, message
+from workbench.device.link import FrameReader, Message, decode_message
 from workbench.device.tables.table_file import TableFile, bounds_of, encode_table
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
@@ -104,7 +104,7 @@ class Sim:
         return buffer.raw[:count]
 
     def messages(self, link: int = LINK_PC) -> list[Message]:
-        return [m for f in self._reader.feed(self.received(link)) if (m := message(f)) is not None]
+        return [m for f in self._reader.feed(self.received(link)) if (m := decode_message(f)) is not None]
 
     def to_neutral(self) -> None:
         for _ in range(60):

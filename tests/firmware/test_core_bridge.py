@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.firmware.native import Sim, until, walk
-from workbench.device.link import AnswerMessage, FrameReader, FrameType, frame
+from workbench.device.link import AnswerMessage, FrameReader, FrameType, encode_frame
 from workbench.device.virtual.protocol import packet
 
 TABLE = walk()
@@ -15,9 +15,9 @@ LIMP, CHECK = 1, 2
 def bridged(seed: int = 0) -> Sim:
     sim = Sim(TABLE, seed=seed)
     sim.to_neutral()
-    sim.send(frame(FrameType.RELEASE))
+    sim.send(encode_frame(FrameType.RELEASE))
     sim.run(100)
-    sim.send(frame(FrameType.BRIDGE))
+    sim.send(encode_frame(FrameType.BRIDGE))
     sim.run(10)
     assert sim.get("state") == 8
     sim.received()
@@ -58,10 +58,10 @@ def test_the_bridge_loses_no_packet_and_passes_on_no_answer_that_was_not_asked_f
     """A read of the controller's own is under way when the bridge begins, or the answer to the packet before is not in."""
     sim = Sim(TABLE)
     sim.to_neutral()
-    sim.send(frame(FrameType.RELEASE))
+    sim.send(encode_frame(FrameType.RELEASE))
     sim.run(100 + wait)
     sim.received()
-    sim.send(frame(FrameType.BRIDGE) + packet(9, 1))
+    sim.send(encode_frame(FrameType.BRIDGE) + packet(9, 1))
     sim.run(8)
     said = sim.received()
     assert said.endswith(packet(9, 0))
@@ -88,7 +88,7 @@ def test_bridge_ends_in_a_ramp_if_something_moved_and_just_lets_go_if_not() -> N
     sim.run(1100)
     assert (sim.get("state"), sim.get("reason")) == (1, 22)
     sim = bridged()
-    sim.send(frame(FrameType.BRIDGE_END))
+    sim.send(encode_frame(FrameType.BRIDGE_END))
     sim.run(20)
     assert sim.get("state") == 1
 
@@ -97,7 +97,7 @@ def test_bridge_is_refused_while_torque_is_on() -> None:
     sim = Sim(TABLE)
     sim.play()
     sim.messages()
-    sim.send(frame(FrameType.BRIDGE))
+    sim.send(encode_frame(FrameType.BRIDGE))
     sim.run(5)
     assert sim.get("state") == 5
     assert not next(m for m in sim.messages() if isinstance(m, AnswerMessage)).well

@@ -9,7 +9,7 @@ import pytest
 
 from tests.firmware.native import LINK_PC, Sim, until, walk
 from tests.firmware.test_core_play import goal_times
-from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame
+from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, encode_frame
 from workbench.device.tables.table_file import JointBounds, TableFile, decode_table, encode_table
 from workbench.motion import PoseTable
 
@@ -162,7 +162,7 @@ def test_what_finds_no_room_on_the_link_is_told_later() -> None:
     sim.play()
     sim.run(500)
     for _ in range(30):
-        sim.send(frame(FrameType.ASK))  # nobody reads: the link's buffer is full
+        sim.send(encode_frame(FrameType.ASK))  # nobody reads: the link's buffer is full
     sim.run(50)
     sim.remote(16)
     sim.remote(0)
@@ -176,7 +176,7 @@ def test_what_finds_no_room_on_the_link_is_told_later() -> None:
 def test_torque_off_is_told_again_to_a_servo_that_missed_it_but_not_all_the_time() -> None:
     sim = Sim(TABLE)
     sim.play()
-    sim.send(frame(FrameType.RELEASE))
+    sim.send(encode_frame(FrameType.RELEASE))
     sim.run(50)
     for k in range(15):
         assert sim.get("torque", k) == 0
@@ -220,7 +220,7 @@ def test_what_comes_on_a_link_waits_while_a_pose_is_a_millisecond_away_and_no_lo
     sim = Sim(TABLE)
     sim.play()
     sim.messages()
-    ask, before_poses, waits = frame(FrameType.ASK), 0, 0
+    ask, before_poses, waits = encode_frame(FrameType.ASK), 0, 0
     for _ in range(400):
         sim.send(ask[:3])  # less than a millisecond's, which would go by
         sim.send(ask[3:])
@@ -270,7 +270,7 @@ def test_the_log_tells_how_many_poses_of_the_cycle_went_out() -> None:
 def test_a_stop_in_the_ramp_of_power_on_changes_nothing() -> None:
     sim = Sim(TABLE)
     until(sim, {RAMP})
-    sim.send(frame(FrameType.STOP))
+    sim.send(encode_frame(FrameType.STOP))
     states = set()
     for _ in range(4000):
         sim.run(1)
@@ -287,7 +287,7 @@ def test_a_button_that_hangs_does_not_start_what_was_stopped_otherwise() -> None
         sim.remote(1)
         sim.run(60)
         if k == 5:
-            sim.send(frame(FrameType.STOP))
+            sim.send(encode_frame(FrameType.STOP))
     assert sim.get("state") == NEUTRAL
     sim.remote(0)
     sim.remote(1)

@@ -15,7 +15,7 @@ from workbench.device.link import (
     FrameType,
     LogMessage,
     StateMessage,
-    frame,
+    encode_frame,
     upload_frames,
 )
 from workbench.device.tables.table_file import TableFile, decode_table, encode_table
@@ -245,7 +245,7 @@ def test_stale_foreign_big_and_broken_uploads_are_refused_with_the_reason() -> N
     import zlib
     foreign = bytes(other) + struct.pack("<I", zlib.crc32(bytes(other)))
     assert upload(sim, foreign, 6).result == "for another robot"
-    sim.send(frame(FrameType.BEGIN, struct.pack("<IIBB", 5000, 0, 7, 0)))
+    sim.send(encode_frame(FrameType.BEGIN, struct.pack("<IIBB", 5000, 0, 7, 0)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["too big"]
     assert upload(sim, changed(10)[:-1] + b"\0", 7).result == "CRC"  # its own, in a frame that is right
@@ -307,7 +307,7 @@ def test_state_is_told_when_it_changes_and_when_asked() -> None:
     sim.run(20)
     told = [m for m in sim.messages() if isinstance(m, StateMessage)]
     assert [(m.state, m.reason) for m in told] == [(ControllerState.STILL, "watchdog: the program hung")]
-    sim.send(frame(FrameType.ASK))
+    sim.send(encode_frame(FrameType.ASK))
     sim.run(5)
     assert sum(isinstance(m, StateMessage) for m in sim.messages()) == 1
 
@@ -316,7 +316,8 @@ def test_a_broken_built_in_table_plays_nothing() -> None:
     sim = Sim(TABLE[:-1] + b"\0")
     sim.run(1000)
     assert (sim.get("state"), sim.get("reason")) == (0, 23)
-    for data in (frame(FrameType.PLAY), frame(FrameType.RELEASE), frame(FrameType.BRIDGE), *upload_frames(TABLE, 1)):
+    asked = (FrameType.PLAY, FrameType.RELEASE, FrameType.BRIDGE)
+    for data in (*map(encode_frame, asked), *upload_frames(TABLE, 1)):
         sim.send(data)
     sim.run(200)
     kinds = [sim.get("event_kind", k) for k in range(sim.get("events"))]

@@ -7,7 +7,7 @@ import pytest
 
 from tests.firmware.native import Sim, until, walk
 from tests.firmware.test_core_play import changed
-from workbench.device.link import REASONS, FrameType, frame
+from workbench.device.link import REASONS, FrameType, encode_frame
 from workbench.device.tables.table_file import TableFile, decode_table, encode_table
 from workbench.motion import PoseTable
 
@@ -44,7 +44,7 @@ def test_no_frame_but_play_gives_torque_back_after_a_release(cause: str) -> None
     sim.play()
     sim.run(300)
     if cause == "release":
-        sim.send(frame(FrameType.RELEASE))
+        sim.send(encode_frame(FrameType.RELEASE))
     elif cause == "held":
         hold_start(sim)
     elif cause == "dead supply":
@@ -57,11 +57,11 @@ def test_no_frame_but_play_gives_torque_back_after_a_release(cause: str) -> None
     sim.run(100)
     for kind in range(256):
         if kind not in (FrameType.PLAY, FrameType.BRIDGE):
-            sim.send(frame(kind))
+            sim.send(encode_frame(kind))
             sim.run(20)
             sim.received()
             assert (sim.get("state"), torque(sim)) == (LIMP, 0), kind
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     sim.to_neutral()
     assert torque(sim) == 15
 
@@ -69,7 +69,7 @@ def test_no_frame_but_play_gives_torque_back_after_a_release(cause: str) -> None
 @pytest.mark.parametrize("cause", [WATCHDOG, BROWN_OUT])
 def test_a_stop_frame_starts_nothing_after_a_reset(cause: int) -> None:
     sim = after_reset_in_walk(cause)
-    sim.send(frame(FrameType.STOP))
+    sim.send(encode_frame(FrameType.STOP))
     sim.run(500)
     assert sim.get("state") == STILL
 
@@ -79,11 +79,11 @@ def test_a_stop_in_the_check_gives_it_up(cause: int, state: int) -> None:
     sim = after_reset_in_walk(cause) if cause else Sim(TABLE)
     if not cause:
         sim.to_neutral()
-        sim.send(frame(FrameType.RELEASE))
+        sim.send(encode_frame(FrameType.RELEASE))
         sim.run(100)
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     until(sim, {CHECK})
-    sim.send(frame(FrameType.STOP))
+    sim.send(encode_frame(FrameType.STOP))
     sim.run(3000)
     assert sim.get("state") == state
 
@@ -103,14 +103,14 @@ def test_start_held_releases_from_every_state() -> None:
         elif name not in ("still",):
             sim.to_neutral()
         if name in ("limp", "bridge"):
-            sim.send(frame(FrameType.RELEASE))
+            sim.send(encode_frame(FrameType.RELEASE))
             sim.run(60)
         if name == "bridge":
-            sim.send(frame(FrameType.BRIDGE))
+            sim.send(encode_frame(FrameType.BRIDGE))
         if name == "stop":
             for j in range(15):
                 sim.set("held", 1, j)
-            sim.send(frame(FrameType.STOP))
+            sim.send(encode_frame(FrameType.STOP))
         if name == "yield":
             sim.set("mute", 1, 2)
             until(sim, {7})
@@ -176,7 +176,7 @@ def test_a_servo_that_never_starts_is_told_after_two_seconds() -> None:
     assert 1990 <= until(sim, {LIMP}) <= 2100
     assert (REASONS[sim.get("reason")], sim.get("servo_named")) == ("a servo is silent", sim.get("id", 6))
     sim.set("boots_until", 0, 6)
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     sim.to_neutral()
 
 
@@ -206,7 +206,7 @@ def snap(far: int) -> bytes:
 def test_no_joint_is_sent_to_the_first_pose_at_once(far: int, ramps: bool) -> None:
     sim = Sim(snap(far))
     sim.to_neutral()
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     states = set()
     for _ in range(4000):
         sim.run(1)
@@ -249,10 +249,10 @@ def test_the_torque_limit_is_put_back_after_a_release_and_after_a_broken_packet(
         sim.set("position", 300, j)
     until(sim, {RAMP})
     sim.run(100)
-    sim.send(frame(FrameType.RELEASE))
+    sim.send(encode_frame(FrameType.RELEASE))
     sim.run(150)
     assert [sim.get("torque_limit", j) for j in range(15)] == [1023] * 15
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     sim.to_neutral()
     sim.set("torque_limit", 1, 4)
     sim.run(100)

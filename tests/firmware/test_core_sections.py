@@ -11,7 +11,7 @@ import pytest
 
 from tests.firmware.native import Sim, core, walk
 from tests.firmware.test_core_play import upload
-from workbench.device.link import REASONS, FrameType, frame
+from workbench.device.link import REASONS, FrameType, encode_frame
 from workbench.device.tables.table_file import TableFile, decode_table, encode_table, table_file
 from workbench.files import InputError
 from workbench.motion import PoseTable
@@ -46,10 +46,10 @@ def played(sim: Sim, ms: int, shift: int = 0) -> list[int]:
 def test_start_once_loop_so_often_stop_once_then_neutral() -> None:
     sim = Sim(sections())
     sim.to_neutral()
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     assert played(sim, 2500) == [0, 1, 2, 3, 4, 2, 3, 4, 5, 6]
     assert (sim.get("state"), REASONS[sim.get("reason")]) == (NEUTRAL, "the table came to its end")
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     assert played(sim, 2500) == [0, 1, 2, 3, 4, 2, 3, 4, 5, 6]
 
 
@@ -58,10 +58,10 @@ def test_start_once_loop_so_often_stop_once_then_neutral() -> None:
 def test_a_stop_is_the_tables_own_after_the_cycle(after: int, order: list[int]) -> None:
     sim = Sim(sections(stops=False))
     sim.to_neutral()
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     sim.run(1)
     before = played(sim, after)
-    sim.send(frame(FrameType.STOP))
+    sim.send(encode_frame(FrameType.STOP))
     seen = before + played(sim, 2500)
     assert [k for i, k in enumerate(seen) if i == 0 or seen[i - 1] != k] == order
     assert (sim.get("state"), REASONS[sim.get("reason")]) == (NEUTRAL, "PC link")
@@ -71,12 +71,12 @@ def test_a_second_stop_and_a_release_end_it_at_once() -> None:
     for second, state in ((FrameType.STOP, STOP), (FrameType.RELEASE, 1)):
         sim = Sim(sections(stops=False))
         sim.to_neutral()
-        sim.send(frame(FrameType.PLAY))
+        sim.send(encode_frame(FrameType.PLAY))
         sim.run(200)
-        sim.send(frame(FrameType.STOP))
+        sim.send(encode_frame(FrameType.STOP))
         sim.run(3)
         assert sim.get("state") == PLAY
-        sim.send(frame(second))
+        sim.send(encode_frame(second))
         sim.run(5)
         assert sim.get("state") == state
 
@@ -84,13 +84,13 @@ def test_a_second_stop_and_a_release_end_it_at_once() -> None:
 def test_another_table_is_entered_at_its_loop_in_the_walk() -> None:
     sim = Sim(sections(stops=False))
     sim.to_neutral()
-    sim.send(frame(FrameType.PLAY))
+    sim.send(encode_frame(FrameType.PLAY))
     sim.run(300)
     assert upload(sim, sections(3, 2, 1, stops=False, shift=1), 1).well
     sim.run(200)
     seen = played(sim, 600, shift=1)
     assert set(seen) == {3, 4}
-    sim.send(frame(FrameType.STOP))
+    sim.send(encode_frame(FrameType.STOP))
     assert played(sim, 1500, shift=1)[-1] == 5
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.firmware.native import Sim, core, walk
 from tests.firmware.test_core_play import changed, upload
-from workbench.device.link import AnswerMessage, FrameType, frame, upload_frames
+from workbench.device.link import AnswerMessage, FrameType, encode_frame, upload_frames
 from workbench.device.tables.table_file import decode_table
 from workbench.files import InputError
 
@@ -34,7 +34,7 @@ def test_an_upload_is_forgotten_after_two_seconds_of_silence() -> None:
         sim.send(upload_frames(changed(3), 1)[0])
         sim.run(silence)
         sim.messages()
-        sim.send(frame(FrameType.END))
+        sim.send(encode_frame(FrameType.END))
         sim.run(5)
         assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == [result]
 
@@ -91,10 +91,10 @@ def test_first_pose_at_the_edge_of_reach() -> None:
 def test_data_beyond_the_size_that_was_said_are_refused() -> None:
     sim = Sim(TABLE)
     sim.to_neutral()
-    sim.send(frame(FrameType.BEGIN, struct.pack("<IIBB", 250, 0, 1, 0)))
-    sim.send(frame(FrameType.DATA, struct.pack("<H", 0) + bytes(200)))
+    sim.send(encode_frame(FrameType.BEGIN, struct.pack("<IIBB", 250, 0, 1, 0)))
+    sim.send(encode_frame(FrameType.DATA, struct.pack("<H", 0) + bytes(200)))
     sim.run(5)
     sim.messages()
-    sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
+    sim.send(encode_frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]

@@ -19,7 +19,7 @@ from workbench.device.link import (
     FrameType,
     LogMessage,
     StateMessage,
-    frame,
+    encode_frame,
     upload_frames,
 )
 from workbench.device.tables.table_file import decode_table
@@ -264,9 +264,9 @@ def flips(seconds: int) -> None:
 def test_bridge_on_the_wire_and_its_end() -> None:
     robot = Robot()
     robot.to_neutral()
-    robot.board.send(robot.board.pc, frame(FrameType.RELEASE))
+    robot.board.send(robot.board.pc, encode_frame(FrameType.RELEASE))
     robot.run(100)
-    robot.board.send(robot.board.pc, frame(FrameType.BRIDGE))
+    robot.board.send(robot.board.pc, encode_frame(FrameType.BRIDGE))
     robot.run(30)
     assert any(isinstance(m, AnswerMessage) and m.well for m in robot.messages())
     before = len(robot.board.pc.received)

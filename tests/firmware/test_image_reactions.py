@@ -14,7 +14,7 @@ from tests.firmware.image import IDS, Robot, needs_compiler
 from tests.firmware.native import walk
 from tests.firmware.test_core_reactions import CELLS, Cell
 from tests.firmware.test_image import goals_of, reset_by
-from workbench.device.link import REASONS, ControllerState, FrameType, StateMessage, frame, upload_frames
+from workbench.device.link import REASONS, ControllerState, FrameType, StateMessage, encode_frame, upload_frames
 from workbench.device.virtual import AX12A, MICROSECOND, MILLISECOND, SECOND, VirtualServo, bit_flips
 from workbench.device.virtual.protocol import packet
 
@@ -214,7 +214,7 @@ def test_silence_of_the_pc_in_bridge_mode_at_twenty_moments() -> None:
     for seed in range(20):
         robot = Robot(seed)
         robot.to_neutral()
-        for data in (frame(FrameType.RELEASE), frame(FrameType.BRIDGE)):
+        for data in (encode_frame(FrameType.RELEASE), encode_frame(FrameType.BRIDGE)):
             robot.board.send(robot.board.pc, data)
             robot.run(100)
         goals = b"".join(bytes([i]) + (520).to_bytes(2, "little") + (50).to_bytes(2, "little") for i in IDS)

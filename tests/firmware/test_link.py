@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.firmware.native import core
-from workbench.device.link import PAYLOAD, Frame, FrameReader, FrameType, frame, message
+from workbench.device.link import PAYLOAD, Frame, FrameReader, FrameType, decode_message, encode_frame
 
 
 def found_by_c(data: bytes) -> list[Frame]:
@@ -25,8 +25,7 @@ def found_by_c(data: bytes) -> list[Frame]:
     return found
 
 
-frames = st.builds(lambda kind, payload, number: frame(kind, payload, number), st.integers(0, 255), st.binary(max_size=PAYLOAD),
-                   st.integers(0, 255))
+frames = st.builds(encode_frame, st.integers(0, 255), st.binary(max_size=PAYLOAD), st.integers(0, 255))
 noise = st.one_of(st.binary(max_size=12), st.sampled_from([b"\xa5", b"\xa5\x5a", b"\xa5\xa5\x5a", b"\xa5\x5a\x01\x02\xff"]))
 
 
@@ -49,7 +48,7 @@ def test_a_frame_that_was_cut_hides_none_of_those_behind_it(parts: list[bytes], 
     data, reader = other[:min(cut, len(other) - 1)] + b"".join(parts) + bytes(220), FrameReader()
     assume(not data.startswith(other))
     found = [f for at in range(0, len(data), step) for f in reader.feed(data[at:at + step])]
-    assert [frame(f.type, f.payload, f.number) for f in found] == parts
+    assert [encode_frame(f.type, f.payload, f.number) for f in found] == parts
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
@@ -57,15 +56,15 @@ def test_a_frame_that_was_cut_hides_none_of_those_behind_it(parts: list[bytes], 
 def test_whole_frames_are_all_found_however_they_are_cut(parts: list[bytes], step: int) -> None:
     data, reader = b"".join(parts), FrameReader()
     found = [f for at in range(0, len(data), step) for f in reader.feed(data[at:at + step])]
-    assert [frame(f.type, f.payload, f.number) for f in found] == parts
+    assert [encode_frame(f.type, f.payload, f.number) for f in found] == parts
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.sampled_from(list(FrameType)), st.integers(0, 255), st.binary(max_size=PAYLOAD))
 def test_no_content_of_a_frame_raises(kind: FrameType, number: int, payload: bytes) -> None:
-    message(Frame(kind, number, payload))
+    decode_message(Frame(kind, number, payload))
 
 
 def test_a_payload_that_is_too_long_is_refused() -> None:
     with pytest.raises(ValueError, match="205 bytes"):
-        frame(1, bytes(205))
+        encode_frame(1, bytes(205))

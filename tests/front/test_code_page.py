@@ -23,11 +23,15 @@ QUESTIONS = {
     "where do radians become counts": ("robot/servo_units.py", "class ServoUnits"),
     "where are InputError": ("files/errors.py", "class InputError"),
     "where is the prior of an effect's size": ("identify/evidence/hypothesis.py", "class Prior"),
-    "where is it decided which search runs": ("identify/diagnosis.py", "is_by_logs"),
+    "where is it decided which search runs": ("identify/evidence/explain.py", "def is_by_logs"),
     "what limits a gait": ("gait/limits.py", "def binding"),
     "which random robots is a gait tested on": ("gait/ensemble.py", "class Ensemble"),
     "who may stop a motion": ("device/play/watch.py", "class Watch"),
     "where do plug-ins come in": ("files/plug_ins.py", "def with_plug_ins"),
+    "where are readings set aside": ("recording/servo_log/faults.py", "def without_faults"),
+    "how is a capture turned": ("recording/mocap/yaw.py", "def session_yaw"),
+    "where do the constants of a servo come from": ("robot/servo_profile_file.py", "def with_family_law"),
+    "how does an effect change the simulation": ("effects/apply.py", "def apply_to_commands"),
 }
 
 

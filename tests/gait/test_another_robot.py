@@ -14,7 +14,7 @@ def test_the_practice_quadruped_walks_by_the_same_numbers():
     model = load_session(practice("p0_nothing_hidden")).model
     machine = GaitMachine(model)
     trot = GaitShape("trot", (-1, 1), 12, 2.4, stride=0.07, duty=0.6, lift=0.03, crouch=0.045, lead=1.0)
-    forward, = Evaluator(machine, Request(), []).judged([trot], 0)
+    forward, = Evaluator(machine, Request(), []).judge([trot], 0)
     assert forward.nominal is not None
     assert not forward.nominal.fell
     assert forward.nominal.speed > 0.15

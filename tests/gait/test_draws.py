@@ -9,10 +9,10 @@ from workbench.gait.draws import (
     FEWEST,
     Drawn,
     bound,
-    described,
+    describe_robot,
     draw_margins,
-    drawn,
     foot_speed,
+    record_draw,
     screened_count,
     slip_margin,
     summary,
@@ -124,10 +124,10 @@ def test_no_quantile_comes_from_fewer_than_twenty_draws():
 def test_a_draw_is_named_with_what_happened():
     model = puppy_model().with_effects((EffectSpec("ground_friction", (), {"friction": 0.8}),
                                         EffectSpec("supply_voltage", (), {"voltage": 10.6})))
-    assert described(model) == "friction 0.80, 10.6 V"
-    fell = drawn(model, replace(WALKED, fell=True, tilt=np.radians(141)), FEET, gave_up=True)
-    touched = drawn(model, WALKED, FEET, gave_up=True)
-    told = summary(Request(), [drawn(model, WALKED, FEET, gave_up=False), fell, touched])
+    assert describe_robot(model) == "friction 0.80, 10.6 V"
+    fell = record_draw(model, replace(WALKED, fell=True, tilt=np.radians(141)), FEET, gave_up=True)
+    touched = record_draw(model, WALKED, FEET, gave_up=True)
+    told = summary(Request(), [record_draw(model, WALKED, FEET, gave_up=False), fell, touched])
     assert told["incidents"] == [
         {"draw": 2, "robot": "friction 0.80, 10.6 V", "what": "fell: tilt 141 deg"},
         {"draw": 3, "robot": "friction 0.80, 10.6 V",
@@ -152,7 +152,7 @@ def test_slip_is_a_share_of_the_speed_at_which_feet_pass_under_the_body(machine)
 
 def test_a_draw_has_the_clearance_and_slip_of_its_feet():
     feet = FeetMeasure(slip=0.07, clearance=0.002, tipping=0.3)
-    kept = drawn(puppy_model(), WALKED, feet, gave_up=False)
+    kept = record_draw(puppy_model(), WALKED, feet, gave_up=False)
     assert (kept.measure.clearance, kept.measure.slip, kept.feet, kept.incident) == (0.002, 0.07, feet, "")
     assert kept.robot == "the nominal robot"
 
@@ -162,7 +162,7 @@ def test_a_robot_is_described_by_its_floor_and_supply_alone():
     sag = EffectSpec("supply_sag", (), {"drop": 0.25})
     one_foot = EffectSpec("coulomb_friction", (model.joints[0],), {"torque": 0.1})
     late = EffectSpec("timing_drift", (), {"per_pose": 0.003})
-    assert described(model.with_effects((sag, one_foot, late))) == "0.25 V sag a servo"
+    assert describe_robot(model.with_effects((sag, one_foot, late))) == "0.25 V sag a servo"
 
 
 def test_a_summary_has_these_numbers_of_robots_that_stand():

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from workbench.files import InputError
-from workbench.gait.drive.controller import CycleController, limited
+from workbench.gait.drive.controller import CycleController, limit_steer
 from workbench.gait.drive.family import STRAIGHT, Steer
-from workbench.gait.drive.observer import ASIDE, BIAS, GAIN, P11, PLAYED, PLAYED_SIDE, first_state, observed
+from workbench.gait.drive.observer import ASIDE, BIAS, GAIN, P11, PLAYED, PLAYED_SIDE, first_state, update_state
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, corridor, plan
@@ -85,7 +85,7 @@ def test_the_plan_keeps_its_limits_where_they_bind() -> None:
     assert np.abs(u).max() <= o.most + 1e-6
     assert np.abs(np.diff(np.concatenate([[0.0], u]))).max() <= o.most_change + 1e-6
     assert u[0] == pytest.approx(-o.most_change, abs=1e-5)
-    assert limited(Steer(-1.0, -1.0), Steer(0.1, 0.002), o) == Steer(0.1 - o.most_change, 0.002 - o.most_side_change)
+    assert limit_steer(Steer(-1.0, -1.0), Steer(0.1, 0.002), o) == Steer(0.1 - o.most_change, 0.002 - o.most_side_change)
 
 
 def test_a_disc_is_passed_on_its_free_side_and_a_robot_inside_one_gets_out() -> None:
@@ -133,7 +133,7 @@ def test_the_observer_takes_no_sideways_stride_for_the_robots_own() -> None:
     for _ in range(40):
         x[PLAYED_SIDE] = 0.004
         y += SIDEWAYS.side_gain * 0.004 - 0.002
-        x = observed(x, np.array([0.0, y, 0.0]), 0.0, replace(SIDEWAYS, side_turns=0.0), DriveOptions())
+        x = update_state(x, np.array([0.0, y, 0.0]), 0.0, replace(SIDEWAYS, side_turns=0.0), DriveOptions())
     assert x[ASIDE] == pytest.approx(-0.002, abs=1e-4)
 
 
@@ -143,7 +143,7 @@ def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
     heading = 0.0
     for _ in range(40):
         heading += 0.03
-        x = observed(x, np.array([0.0, 0.0, heading]), 0.0, replace(MAP, scatter=(1e-4, 0.0)), o)
+        x = update_state(x, np.array([0.0, 0.0, heading]), 0.0, replace(MAP, scatter=(1e-4, 0.0)), o)
     assert x[BIAS] == pytest.approx(0.03, abs=1e-4)
     assert np.sqrt(x[P11]) < 1e-3
 
@@ -155,7 +155,7 @@ def test_the_observer_separates_gain_from_bias() -> None:
     for turn in rng.uniform(-0.15, 0.15, 60):
         heading += 0.035 + 4 / 3 * (MAP.gain * turn + MAP.memory * before)
         x[PLAYED] = turn
-        x = observed(x, np.array([0.0, 0.0, heading]), before, replace(MAP, scatter=(1e-3, 0.0)), o)
+        x = update_state(x, np.array([0.0, 0.0, heading]), before, replace(MAP, scatter=(1e-3, 0.0)), o)
         before = turn
     assert x[GAIN] == pytest.approx(1 / 3, abs=0.02)
     assert x[BIAS] == pytest.approx(0.035, abs=0.002)

@@ -9,7 +9,7 @@ from workbench.files import InputError
 from workbench.gait.evaluate import SEARCH, Evaluator
 from workbench.gait.machine import GaitMachine
 from workbench.gait.plan_compare import compare_plan
-from workbench.gait.plan_method import Plans, chosen, told_of_plan
+from workbench.gait.plan_method import Plans, choose_plan, plan_entry
 from workbench.gait.planned import table_shape, tasks_of
 from workbench.gait.request import Request
 from workbench.gait.rollouts import Rollouts
@@ -42,9 +42,9 @@ def test_it_walks_nearly_as_fast_as_planned_and_its_bodies_are_near(planned):
     machine, request, solved, shape = planned
     evaluator = Evaluator(machine, request, (), n_jobs=1)
     plans = Plans({shape.offsets: solved}, (shape,), 1)
-    found = chosen(evaluator, plans, lambda what, done: None)
+    found = choose_plan(evaluator, plans, lambda what, done: None)
     assert found is not None
-    told = told_of_plan(found.best, plans)["planned"]
+    told = plan_entry(found.best, plans)["planned"]
     assert 0.8 < told["share of it"] < 1.15
     table = gait_table(machine, shape)
     job = Job(machine.model, SEARCH, table.commands(5), table.start_seconds + 5 * table.period, 0.3)

@@ -11,7 +11,7 @@ from workbench.gait.evaluate import Evaluator
 from workbench.gait.limits import Margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
-from workbench.gait.refine import FALLEN, Goal, RefineOptions, gauss_newton, refined
+from workbench.gait.refine import FALLEN, Goal, RefineOptions, gauss_newton, refine
 from workbench.gait.request import Request
 from workbench.gait.search import Found
 from workbench.gait.shape import GaitShape
@@ -37,7 +37,7 @@ def better(evaluator):
 
 
 def test_the_gait_is_faster_and_no_joint_moved_far(evaluator, better):
-    before, after = evaluator.measured([(SHAPE, evaluator.nominal), (better, evaluator.nominal)])
+    before, after = evaluator.measure([(SHAPE, evaluator.nominal), (better, evaluator.nominal)])
     assert after.speed > 1.1 * before.speed
     assert not after.fell
     assert 0.2 < math.degrees(np.abs(np.array(better.offsets)).max()) < 15
@@ -53,11 +53,11 @@ def test_left_and_right_are_mirror_images_half_a_cycle_apart(evaluator, better):
 
 
 def test_what_does_not_go_straight_is_left_as_it_is(evaluator):
-    (candidate,) = evaluator.judged([SHAPE], 0)
+    (candidate,) = evaluator.judge([SHAPE], 0)
     found = Found(candidate, None, 0, 0)
     turning = Evaluator(evaluator.machine, Request("turn", 0.5), (), n_jobs=1)
-    assert refined(turning, found, SMALL, silent) is found
-    assert refined(evaluator, found, replace(SMALL, iterations=0), silent) is found
+    assert refine(turning, found, SMALL, silent) is found
+    assert refine(evaluator, found, replace(SMALL, iterations=0), silent) is found
 
 
 def test_parts_of_a_change_that_breaks_a_limit_are_tried_and_kept_in_order(evaluator, better, monkeypatch):
@@ -66,7 +66,7 @@ def test_parts_of_a_change_that_breaks_a_limit_are_tried_and_kept_in_order(evalu
     class Strict(Evaluator):
         """Refuses whole changes, and calls the rest the faster the larger the change."""
 
-        def judged(self, shapes, draws, keep=None):
+        def judge(self, shapes, draws, keep=None):
             out = []
             for s in shapes:
                 part = np.abs(np.array(s.offsets)).max() / np.abs(offsets).max() if s.offsets else 0.0
@@ -74,11 +74,11 @@ def test_parts_of_a_change_that_breaks_a_limit_are_tried_and_kept_in_order(evalu
                 out.append(replace(start, table=gait_table(self.machine, s), margins=(limit,), cost=1.0 - part))
             return out
 
-    (start,) = evaluator.judged([SHAPE], 0)
+    (start,) = evaluator.judge([SHAPE], 0)
     start = replace(start, margins=(), cost=1.0)
     monkeypatch.setattr("workbench.gait.refine.gauss_newton", lambda *_: better)
     strict = Strict(evaluator.machine, Request(), (), n_jobs=1)
-    found = refined(strict, Found(start, None, 0, 0), replace(SMALL, parts=(1.0, 0.6, 0.3)), silent)
+    found = refine(strict, Found(start, None, 0, 0), replace(SMALL, parts=(1.0, 0.6, 0.3)), silent)
     assert [round(c.cost, 2) for c in (found.best, *found.others)] == [0.4, 0.7, 1.0]
 
 
@@ -89,7 +89,7 @@ WALKED = GaitMeasure(False, (0.3, 0.0), 0.0, 1.0, 0.0, 0.0, 0.1, (0.1,) * 15, (0
 class Canned(Evaluator):
     """Results of each robot, whatever the shape."""
 
-    def measured(self, runs):
+    def measure(self, runs):
         robots = (self.nominal, *self.draws)
         return [next(m for other, m in zip(robots, self.results) if other is robot) for _, robot in runs]
 

@@ -19,7 +19,7 @@ from workbench.gait.optimize import OptimizeOptions, optimize, options_of
 from workbench.gait.refine import RefineOptions
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
-from workbench.gait.search import Budget, Found, search, steered
+from workbench.gait.search import Budget, Found, search, steer
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import paths_of
@@ -67,7 +67,7 @@ def test_seeds_are_of_every_family_and_of_the_request(machine):
 def test_a_gait_that_breaks_a_limit_comes_after_all_that_keep_them(machine):
     evaluator = Evaluator(machine, Request(), [])
     shapes = seeds(machine, Request(), space_of(machine, Request()), 8, 1)
-    judged = sorted(evaluator.judged(shapes, 0), key=lambda c: c.rank())
+    judged = sorted(evaluator.judge(shapes, 0), key=lambda c: c.rank())
     good = [c.good for c in judged]
     assert good == sorted(good, reverse=True)
     broken = [c.merit for c in judged if not c.good]
@@ -98,8 +98,8 @@ def test_a_gait_that_turns_is_steered_straight(machine):
     request = Request()
     space, evaluator = space_of(machine, request), Evaluator(machine, request, [])
     trot = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
-    (crooked,) = evaluator.judged([replace(trot, turn=0.05)], 0)
-    (straight,) = steered(evaluator, space, [crooked])
+    (crooked,) = evaluator.judge([replace(trot, turn=0.05)], 0)
+    (straight,) = steer(evaluator, space, [crooked])
     assert abs(drift(request, crooked.nominal)) > request.limits.drift
     assert abs(drift(request, straight.nominal)) < abs(drift(request, crooked.nominal)) / 3
 
@@ -109,8 +109,8 @@ def test_every_gait_that_counts_was_tried_on_the_ensemble_from_the_first_generat
     seen = []
 
     class Watched(Evaluator):
-        def judged(self, shapes, count, keep=None):
-            out = super().judged(shapes, count, keep)
+        def judge(self, shapes, count, keep=None):
+            out = super().judge(shapes, count, keep)
             seen.append(count)
             return out
 
@@ -125,7 +125,7 @@ def test_a_search_begins_at_the_gait_it_is_given(machine):
     evaluator = Evaluator(machine, Request(), [])
     one = replace(SMALL, seeds=0, draws=0, generations=1)
     found = search(evaluator, one, 1, quiet, (start,))
-    (walked,) = steered(evaluator, space_of(machine, Request()), evaluator.judged([start], 0))
+    (walked,) = steer(evaluator, space_of(machine, Request()), evaluator.judge([start], 0))
     assert (found.best.shape.family, found.best.shape.knees) == ("trot", (1, 1))
     assert found.best.rank() <= walked.rank()
     with pytest.raises(InputError, match="a gait to start from"):
@@ -165,7 +165,7 @@ def test_finalists_are_tried_one_after_the_other_on_fresh_robots_until_one_holds
     slow, fast = (GaitShape("trot", (1, 1), 8, 2.2, stride=stride, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
                   for stride in (0.02, 0.06))
     brief = replace(CertifyOptions(), seconds=1.0, draw_seconds=1.0, step=2e-3)
-    begun = Evaluator(machine, lax, []).judged([slow, fast], 0)
+    begun = Evaluator(machine, lax, []).judge([slow, fast], 0)
     found = Found(begun[0], None, 1, 2, (begun[1],))
     between = 0.5 * sum(c.nominal.speed for c in begun)
     first, second = finalists(machine, replace(lax, speed=between), found, fresh, Screening((1, 3)), brief, None, 1, quiet)
@@ -233,7 +233,7 @@ def test_the_bundled_file_is_the_default():
 def test_what_goes_to_the_right_mirrors_what_goes_to_the_left(machine, way, shape):
     left, right = Request(way), Request(way, right=True)
     mirrored = replace(shape, turn=-shape.turn, side=-shape.side)
-    (a,), (b,) = (Evaluator(machine, r, [], seconds=1.0).judged([s], 0) for r, s in ((left, shape), (right, mirrored)))
+    (a,), (b,) = (Evaluator(machine, r, [], seconds=1.0).judge([s], 0) for r, s in ((left, shape), (right, mirrored)))
     assert left.progress(a.nominal) > 0
     assert right.progress(b.nominal) == pytest.approx(left.progress(a.nominal), rel=0.15)
     assert right.progress(a.nominal) < 0
@@ -243,7 +243,7 @@ def test_what_goes_to_the_right_mirrors_what_goes_to_the_left(machine, way, shap
 
 def test_an_arc_to_the_right_has_its_curvature_judged_to_the_right(machine):
     request = Request("arc", radius=0.5, right=True)
-    (walked,) = Evaluator(machine, request, [], seconds=1.0).judged(
+    (walked,) = Evaluator(machine, request, [], seconds=1.0).judge(
         [GaitShape("trot", (1, 1), 8, 2.2, stride=0.05, turn=-0.1, lift=0.02, crouch=0.04, lead=1.0)], 0)
     bend = {m.name: m.value for m in walked.margins}["curvature off the arc"]
     assert bend == pytest.approx(abs(-walked.nominal.turn_rate * 0.5 / walked.nominal.speed - 1))

@@ -137,7 +137,7 @@ def test_mocap_of_the_base_shows_what_the_rollout_does(machine, tmp_path):
     table = gait_table(machine, SHAPE)
     record(tmp_path / "walk.csv", robot, table.commands(8), table.start_seconds + 8 * table.period)
     seen = turn_in(tmp_path / "walk.csv", machine.model, table.period)
-    (walked,) = Evaluator(machine, Request(), (), n_jobs=1).measured([(SHAPE, robot)])
+    (walked,) = Evaluator(machine, Request(), (), n_jobs=1).measure([(SHAPE, robot)])
     assert math.degrees(seen.heading) == pytest.approx(math.degrees(drift(Request(), walked)), abs=4)
     assert seen.sd < math.radians(5)
 

@@ -173,8 +173,11 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    before = nominal_residuals(quiet, evaluator)
+    before, sent = nominal_residuals(quiet, evaluator), evaluator
     evaluator, (missed,) = with_dropped_commands(evaluator, quiet[0], before)
+    again = TakesAsPlayed(sent, (missed,)).as_found()
+    np.testing.assert_array_equal(again.evidence[0].take.commands.goals, evaluator.evidence[0].take.commands.goals)
+    np.testing.assert_array_equal(sent.evidence[0].take.commands.goals, commands.goals)
     assert (missed.joint, missed.count, missed.of) == ("one", 1, len(commands.times))
     finding = missed.finding()
     share = finding.parameters["probability"]
@@ -248,13 +251,13 @@ def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
     evaluator = recorded_with(quiet, stopped)
     kept = poses_lost(evaluator, quiet[0], "two", {0: ()}, nominal_residuals(quiet, evaluator))[0][0]
     assert len(kept) == 2
-    assert all(stands_at_an_end(evaluator.evidence, 0, "two", k) for k in kept)
+    assert stands_at_an_end(evaluator.evidence, "two", {0: kept})
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
     ((lost,),) = poses_lost(evaluator, quiet[0], "one", {0: ()}, nominal_residuals(quiet, evaluator))[0].values()
-    assert not stands_at_an_end(evaluator.evidence, 0, "one", lost)
+    assert not stands_at_an_end(evaluator.evidence, "one", {0: (lost,)})
 
 
 def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):

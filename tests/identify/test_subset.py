@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.arm import arm, goals, measured, played
+from benchmarks.arm import session as log_session
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import load_session
@@ -12,10 +14,11 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify import subset as share
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.options import PROBLEM
-from workbench.identify.preparation import gather
+from workbench.identify.preparation import gather, prepare
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
+from workbench.robot import EffectSpec
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -83,17 +86,35 @@ def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(t
     np.testing.assert_allclose(floors[1] * never.sigma, early.sigma)
 
 
-def test_a_take_is_cropped_to_what_is_looked_at_and_says_the_same_to_the_bit(two):
+LATE, FAST, LOSING = (EffectSpec(name, (), numbers) for name, numbers in (
+    ("command_delay", {"delay": 0.05}), ("clock_rate", {"ratio": 0.55}), ("timing_drift", {"per_pose": -0.02})))
+
+
+@pytest.mark.parametrize("effects", [(), (LATE,), (FAST,), (LOSING, LATE)])
+@pytest.mark.parametrize("until", [1.2, 0.3])
+def test_a_take_is_cropped_to_what_is_looked_at_and_says_the_same_to_the_bit(two, until, effects):
     model, evaluator, _ = two
+    model = model.with_effects(effects)
     e = evaluator.evidence[0]
-    cropped = e.looked_at(1.2)
-    assert cropped.since[-1] < 1.2 + PROBLEM.late + 3 * e.frame_time < e.since[-1]
+    cropped = e.looked_at(until)
+    assert cropped.since[-1] < until + PROBLEM.late + 3 * e.frame_time < e.since[-1]
     assert len(cropped.take.recorded.q) == len(cropped.recorded) == len(cropped.offset) == len(cropped.uses["fit"])
-    whole = replace(e, until=1.2, uses={use: mask & (e.since <= 1.2) for use, mask in e.uses.items()})
+    assert (len(cropped.take.commands.times) < len(e.take.commands.times)) is (until < 0.5)
+    whole = replace(e, until=until, uses={use: mask & (e.since <= until) for use, mask in e.uses.items()})
     left = [evaluator.on([of]).residuals([RolloutRequest(model, (0,))])[0][0] for of in (cropped, whole)]
     np.testing.assert_array_equal(left[0], left[1][:len(left[0])])
     assert np.isfinite(left[0]).any()
     assert not np.isfinite(left[1][len(left[0]):]).any()
+
+
+def test_a_cropped_take_is_played_by_the_beginning_of_other_commands(two):
+    whole, cropped = (two[1].evidence[0], two[1].evidence[0].looked_at(0.3))
+    other = replace(whole.take.commands, goals=-whole.take.commands.goals)
+    kept = len(cropped.take.commands.times)
+    assert 0 < kept < len(other.times)
+    np.testing.assert_array_equal(cropped.played(other).take.commands.goals, other.goals[:kept])
+    assert whole.played(other).take.commands is other
+    assert cropped.played(None).take.commands is None
 
 
 @pytest.mark.parametrize("long", [1.0, 60.0])
@@ -157,3 +178,16 @@ def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones
                for e, w in zip(shorter, evidence))
     judging = replace(evidence[1], uses=dict.fromkeys(evidence[1].uses, np.zeros(len(evidence[1].recorded), dtype=bool)))
     assert [e.until for e in at_most([evidence[0], judging], 2.0)] == pytest.approx([2.0, 0.0])
+
+
+def test_of_a_logs_nominal_rollout_only_the_rows_of_the_log_are_kept(tmp_path):
+    model, told = arm(tmp_path), goals(1.0)
+    session = log_session(tmp_path, measured(told, played(model, told, ()), seed=1))
+    takes, _ = read_takes(session)
+    seen = prepare(session, takes, CONFIG, 1, lambda what, done: None)
+    (kept,), (e,) = seen.nominal.values(), seen.evidence
+    (whole,) = roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1, floors=False)
+    assert len(kept) == len(e.take.recorded) < len(whole.nominal)
+    shown, usual = e.take.observe(kept), e.take.observe(whole.nominal)
+    np.testing.assert_array_equal(shown.time, usual.time)
+    np.testing.assert_array_equal(shown.q, usual.q)

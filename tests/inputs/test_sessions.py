@@ -20,7 +20,7 @@ from workbench.cli.check import check_session
 from workbench.cli.output import LEFT, output_directory
 from workbench.compare.session import load_session
 from workbench.files import InputError
-from workbench.inspect.problems import session_check, summed_up
+from workbench.inspect.problems import session_check, summarize
 from workbench.recording import read_recording, write_motive
 
 
@@ -132,7 +132,7 @@ def test_a_motion_of_a_take_is_checked_as_alone(arm: Path, capsys: pytest.Captur
 
 
 def test_many_problems_are_one_line() -> None:
-    assert summed_up(["a", "b", "c", "d"]) == "a; b; c (and 1 more: see workbench inspect)"
+    assert summarize(["a", "b", "c", "d"]) == "a; b; c (and 1 more: see workbench inspect)"
 
 
 def test_warnings_wait_for_a_run_that_ends_well_or_is_long(capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,3 +27,13 @@ def test_log_keeps_only_what_changes() -> None:
     assert (commands.poses == -1).all()
     every = commands.reference(time - time[0])  # at once: the reference is the goal of each sample
     assert every == pytest.approx(np.where(np.isnan(goals), 1, goals))
+
+
+def test_the_commands_until_a_time_end_when_the_next_would_have_come() -> None:
+    commands = commands_of_rows(np.arange(5.0), ("a",), np.array([[0.0], [1], [2], [3], [3]]), np.ones((5, 1), dtype=bool))
+    early = commands.until(1.5)
+    assert (early.times.tolist(), early.goals[:, 0].tolist(), early.end) == ([0, 1], [0, 1], 2.0)
+    assert len(early.poses) == len(early.enabled) == len(early.speeds) == 2
+    np.testing.assert_array_equal(early.reference(np.linspace(-1, 1.9, 9)), commands.reference(np.linspace(-1, 1.9, 9)))
+    assert commands.until(2.0).times.tolist() == [0, 1, 2]
+    assert commands.until(3.0) is commands

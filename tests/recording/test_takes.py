@@ -218,3 +218,16 @@ def test_a_take_resampled_keeps_what_servos_do_not_turn(model):
     half = take.resampled(take.time[::2])
     np.testing.assert_allclose(half.off_axis, take.off_axis[::2], atol=1e-12)
     np.testing.assert_allclose(half.q, take.q[::2], atol=1e-12)
+
+
+def test_the_pose_of_a_held_base_is_kept_once_and_resampled_like_any_other() -> None:
+    time, pose, turn = np.arange(0.0, 1.01, 0.1), np.array([0.3, -0.2, 0.1]), np.array([0.8, 0.6, 0.0, 0.0])
+    held = Take("held", "simulation", time, ("a",), np.sin(time)[:, None], base="fixed",
+                p_WB=np.broadcast_to(pose, (11, 3)), quat_WB=np.broadcast_to(turn, (11, 4)))
+    copied = replace(held, p_WB=np.tile(pose, (11, 1)), quat_WB=np.tile(turn, (11, 1)))
+    for at in (np.linspace(0.0, 1.0, 1000), np.array([-0.1, 0.0, 0.55, 1.0, 1.2, np.nan])):
+        seen, usual = held.resampled(at), copied.resampled(at)
+        np.testing.assert_array_equal(seen.p_WB, usual.p_WB)
+        np.testing.assert_array_equal(seen.quat_WB, usual.quat_WB)
+        np.testing.assert_array_equal(seen.q, usual.q)
+    assert held.resampled(np.linspace(0.0, 1.0, 1000)).p_WB.strides[0] == 0

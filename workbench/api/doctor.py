@@ -36,7 +36,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Health:
-    """All checks."""
+    """The results of all checks."""
 
     checks: tuple[Check, ...]
 

@@ -13,12 +13,13 @@ from workbench.device.virtual.clock import SECOND
 from workbench.files import InputError
 from workbench.gait.drive.controller import CycleController
 from workbench.gait.drive.family import GaitFamily
-from workbench.gait.drive.loop import FELL, Driven, Progress, Watch, drive
+from workbench.gait.drive.loop import FELL, Driven, Watch, drive
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.robot_walk import ControllerWalk, PoseSource, RobotWalkOptions
 from workbench.robot import RobotModel
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.simulation.virtual_robot import VirtualRobot
+from workbench.types import Progress
 
 ARRIVED = ("end of the path",)
 

@@ -121,7 +121,7 @@ def _film(virtual: VirtualRobot, played: Played | ControllerRun, take: Path, see
 
 
 def _takes(name: str, cycles: int, base: str, played: Played, capture: Capture | None) -> list[dict[str, Any]]:
-    """Of the cameras, with the start that both clocks tell, and of the servos themselves."""
+    """The takes of the cameras, with the start that both clocks give, and of the servos' own log."""
     takes: list[dict[str, Any]] = []
     if capture is not None:
         starts = played.started - capture.first_host

@@ -113,8 +113,9 @@ class DiagnosisResult:
             save_motion(self.next_motion, paths[-1])
         if self.session.predict:
             (folder / "predict").mkdir(exist_ok=True)
-            judged = self.diagnosis.provenance.get("engine", {}).get("rollouts by") == COMPILED  # made with these very models
-            config = SimulationConfig(contact_period=0, engine="auto" if judged else "drake")
+            # Drake has judged the compiled station on these very models
+            compiled_agrees = self.diagnosis.provenance.get("engine", {}).get("rollouts by") == COMPILED
+            config = SimulationConfig(contact_period=0, engine="auto" if compiled_agrees else "drake")
             paths += predict_session(self.session, self.model, folder / "predict", progress, nominal=self.session.model,
                                      config=config, n_jobs=jobs).paths
         return paths

@@ -19,10 +19,10 @@ VIRTUAL = "virtual"
 
 
 def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    """--port, --rate, --echo, --robot."""
-    said = default or "the only USB adapter"
+    """--port, --rate, --echo, --bridge, --robot, --base. default: of --port; None: the only USB adapter."""
+    default_port = default or "the only USB adapter"
     parser.add_argument("--port", metavar="PORT", default=default,
-                        help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {said})")
+                        help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {default_port})")
     parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S",
                         help="baud rate of the servo bus (default: 1000000)")
     parser.add_argument("--echo", action="store_true", help="the adapter echoes its own transmissions")
@@ -63,15 +63,23 @@ def open_servo_port(args: argparse.Namespace, virtual: VirtualRobot | None) -> I
     """The port that leads to the servos, through the CM-530 with --bridge; closed at the end."""
     from workbench.device.bus import open_port
     from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
-    from workbench.device.bus.ports import GONE
 
-    port = virtual.port if virtual is not None else open_port(_port_name(args), RATE if args.bridge else args.rate)
-    try:
+    with _closing(virtual.port if virtual is not None
+                  else open_port(_port_name(args), RATE if args.bridge else args.rate)) as port:
         if args.bridge:
             enter_bridge(port)
         yield port
         if args.bridge:
             leave_bridge(port)
+
+
+@contextmanager
+def _closing(port: Any) -> Iterator[Any]:
+    """The port, closed at the end even if the adapter was pulled."""
+    from workbench.device.bus.ports import GONE
+
+    try:
+        yield port
     finally:
         with suppress(*GONE):
             port.closePort()
@@ -92,29 +100,20 @@ def _port_name(args: argparse.Namespace) -> str:
 @contextmanager
 def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iterator[object]:
     """The CM-530's PC link: a serial port, or that of an emulated one that runs --image."""
-    from pathlib import Path
-
     from workbench.device.bus import open_port
     from workbench.device.bus.bridge import RATE
-    from workbench.device.bus.ports import GONE
     from workbench.files import InputError
+    from workbench.files.reading import read_bytes
 
     if virtual is None:
-        port = open_port(_port_name(args), RATE)
-        try:
+        with _closing(open_port(_port_name(args), RATE)) as port:
             yield port
-        finally:
-            with suppress(*GONE):
-                port.closePort()
         return
     if args.image is None:
         raise InputError(None, "the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
     if find_spec("unicorn") is None:
         raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
-    try:
-        image = Path(args.image).read_bytes()
-    except OSError as e:
-        raise InputError(args.image, f"cannot be read ({e.strerror})") from None
+    image = read_bytes(args.image)
     from workbench.device.virtual.cm530 import Board
     from workbench.device.virtual.cm530.port import PcLinkPort
 

@@ -36,28 +36,28 @@ def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[st
     return found.damaged_takes
 
 
-def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:
+def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], warned: frozenset[str] = frozenset()) -> None:
     """Names the takes that were left out and why, except those already reported (`told`) before the work."""
     for name, reason in left_out:
-        if name not in told:
+        if name not in warned:
             print(f"workbench {verb}: warning: take '{name}' left out: {reason}", file=sys.stderr)
 
 
 def check_model(verb: str, model: RobotModel) -> None:
     """Warns of a robot's problems."""
-    from workbench.inspect.problems import model_problems_of, summed_up
+    from workbench.inspect.problems import model_problems_of, summarize
 
     problems = model_problems_of(model)
-    warn(verb, [f"{model.description}: {summed_up(problems)}"] if problems else [])
+    warn(verb, [f"{model.description}: {summarize(problems)}"] if problems else [])
 
 
 def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of a motion's problems; InputError if it lasts so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
-    from workbench.inspect.problems import motion_problems, slow_poses, summed_up
+    from workbench.inspect.problems import motion_problems, slow_poses, summarize
 
     problems = motion_problems(motion, cycles)
-    warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
+    warn(verb, [f"{motion.source}: {summarize(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
         raise InputError(motion.source, f"{text} Add --yes if this is intended")
     _ask(motion.source, motion.seconds(cycles), yes)
@@ -109,7 +109,7 @@ def _check_certificate(verb: str, path: str, motion: Motion, model: RobotModel, 
 
 def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
-    from workbench.inspect.problems import recording_problems, serious, summed_up
+    from workbench.inspect.problems import recording_problems, serious, summarize
     from workbench.motion import load_motion
     from workbench.recording.formats.file_kind import file_kind
     from workbench.recording.formats.read import read_recording
@@ -122,7 +122,7 @@ def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int 
         elif kind == "recording":
             recording = read_recording(file)
             problems = serious(recording_problems(file, recording, model))
-            warn(verb, [f"{file}: {summed_up(problems)}"] if problems else [])
+            warn(verb, [f"{file}: {summarize(problems)}"] if problems else [])
             _ask(file, float(recording.time[-1] - recording.time[0]), yes)
 
 

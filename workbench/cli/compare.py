@@ -50,13 +50,13 @@ def run(args: argparse.Namespace) -> int:
         files = [file for file in (args.a, args.b) if file is not None]
         return report_torque_logs("compare", files, load_model(args.model, args.packages), args.out)
     config = SimulationConfig(contact=args.contact, engine="drake")
-    told: frozenset[str] = frozenset()
+    warned: frozenset[str] = frozenset()
     with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:
         if args.b is None:
             session = load_session(args.a)
             if args.model != PUPPY:
                 session = session.with_model(load_model(args.model, args.packages))
-            told = check_session("compare", session, args.yes)
+            warned = check_session("compare", session, args.yes)
             result = compare_session(session, config, progress=progress, jobs=args.jobs,
                                      finer_steps="drake" if args.engine == "drake" else "judged")
             comparison, written = result.comparison, result.save(folder, progress)
@@ -67,6 +67,6 @@ def run(args: argparse.Namespace) -> int:
                                        n_jobs=args.jobs)
             written = write_comparison(comparison, model, folder, f"{args.a} and {args.b}", progress)
     print(comparison.table())
-    say_left_out("compare", comparison.left_out, told)
+    say_left_out("compare", comparison.left_out, warned)
     print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
     return 0

@@ -17,7 +17,7 @@ from typing import Any
 
 
 def defaults_file() -> Path:
-    """Its path, whether or not it exists."""
+    """The path of the user's defaults file, whether or not it exists."""
     named = os.environ.get("WORKBENCH_DEFAULTS")
     folder = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
     return Path(named) if named else folder / "workbench/defaults.yaml"

@@ -67,13 +67,13 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.view.report.words import hidden_effects, said_aside
 
     session, before = load_session(path), None if previous is None else Path(previous)
-    told = check_session("diagnose", session, yes)
+    warned = check_session("diagnose", session, yes)
     with (output_directory(out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
           rollout_memory(out, session, memory) as kept):
         result = diagnose(session, DiagnoseOptions(jobs, thorough, kept, without, before, engine), progress=progress)
         paths = result.save(folder, progress, jobs)
     diagnosis = result.diagnosis
-    say_left_out("diagnose", diagnosis.left_out, told)
+    say_left_out("diagnose", diagnosis.left_out, warned)
     if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")

@@ -78,13 +78,13 @@ def run(args: argparse.Namespace) -> int:
     kept = args.out / f"transcript-{time.strftime('%Y%m%d-%H%M%S')}.txt"
     try:
         with Progress("flash") as progress:
-            said = Loading(line, profile, transcript, progress).run(program.image)
+            state = Loading(line, profile, transcript, progress).run(program.image)
     except LoadError as e:
         raise InputError("flash", f"{e} (transcript: {kept})") from None
     finally:
         line.close()
         write_whole(kept, transcript.text)
-    print(f"started: it is at {said.state.name.lower()}, woke from {said.woke_from}; transcript: {kept}")
+    print(f"started: it is at {state.state.name.lower()}, woke from {state.woke_from}; transcript: {kept}")
     return 0
 
 

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 PUPPY = "package://puppy/puppy.sdf"
 MOST = 10_000
-"""Largest number of cycles, processes and the like."""
+"""Largest number of cycles, processes and the like: more is a mistake, not a wish."""
 SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
 """Bounds of the simulation's time step [s]: a walk of 10 s takes a million of the shortest, and feet sink in with the longest."""
 
 
 def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy", unless: str | None = PUPPY) -> None:
-    """--model: which robot; `unless` where the user names none. default: description of that default."""
+    """--model: which robot. unless: its value where the user names none; default: how the help describes that."""
     parser.add_argument(
         "--model", metavar="FILE", default=unless,
         help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml, whose robot, servos "
@@ -40,14 +40,14 @@ def add_packages(parser: argparse.ArgumentParser) -> None:
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
     """--out: the folder for results."""
-    said = "; created if missing, other files in it are kept"
+    kept = "; created if missing, other files in it are kept"
     parser.add_argument(
         "--out", metavar="DIR", type=_folder, required=default is None, default=default and Path(default),
-        help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))
+        help=f"folder for the results{kept}" + (f" (default: {default})" if default else ""))
 
 
 def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
-    """--engine: which engine rolls out; auto: described by `default`."""
+    """--engine: which engine simulates. auto: what `auto` means for this verb, for the help."""
     parser.add_argument("--engine", choices=("auto", "drake"), default="auto",
                         help=f"auto: {auto}; drake: all rollouts by Drake, much slower (default: auto)")
 

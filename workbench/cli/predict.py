@@ -37,10 +37,10 @@ def run(args: argparse.Namespace) -> int:
 
     session = load_session(args.session)
     model = session.model if args.model is None else load_model(args.model, args.packages)
-    told = check_session("predict", session, args.yes)
+    warned = check_session("predict", session, args.yes)
     with output_directory(args.out) as folder, Progress("predict", stages=("finding", "simulating")) as progress:
         config = SimulationConfig(contact=args.contact, engine="drake")
         predicted = predict_session(session, model, folder, progress, config=config, n_jobs=args.jobs)
-    say_left_out("predict", predicted.left_out, told)
+    say_left_out("predict", predicted.left_out, warned)
     print(f"wrote {args.out}: {', '.join(path.name for path in predicted.paths)}")
     return 0

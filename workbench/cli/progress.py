@@ -28,10 +28,10 @@ def progress_mode(quiet: bool, verbose: bool) -> None:
 def warn(verb: str, lines: Iterable[str]) -> None:
     """Adds warnings for stderr. They are shown once the run turns out to be long, or when it succeeds: if it is refused, only the
     error is shown."""
-    said = [f"workbench {verb}: warning: {line}" for line in lines]
-    for line in said:
+    warnings = [f"workbench {verb}: warning: {line}" for line in lines]
+    for line in warnings:
         LOGGER.warning("%s", line)
-    _WAITING.extend(said)
+    _WAITING.extend(warnings)
 
 
 def show_warnings(stream: TextIO | None = None) -> None:
@@ -126,8 +126,8 @@ class Progress:
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"
         stage = f"{self._stage} of {len(self._stages)}, " if self._stage else ""
         spent = now - self._entered
-        told = done is not None and 0.05 < done < 1 and spent > 5
-        left = f", about {spent * (1 / done - 1):.0f} s left of this" if done is not None and told else ""
+        shows_remaining = done is not None and 0.05 < done < 1 and spent > 5
+        left = f", about {spent * (1 / done - 1):.0f} s left of this" if done is not None and shows_remaining else ""
         line = f"workbench {self._verb}: {stage}{what}{share} ({now - self._started:.0f} s{left})"
         self._stream.write(f"\r\x1b[2K{line[:110]}" if self._tty else f"{line}\n")
         self._stream.flush()

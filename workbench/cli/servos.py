@@ -122,7 +122,7 @@ def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
     findings = answers.findings(bus_ids(model))
     for finding in findings:
         print(f"workbench servos: problem: {finding}", file=sys.stderr)
-    for key, values in answers.corrected(bus_ids(model), model.mountings).items() if findings else ():
+    for key, values in answers.corrections(bus_ids(model), model.mountings).items() if findings else ():
         print(f"the robot section should say {key}: {{{', '.join(f'{joint}: {v}' for joint, v in values.items())}}}")
     return 2 if findings else 0
 

@@ -42,17 +42,18 @@ def report_torque_logs(verb: str, files: Sequence[str], model: RobotModel, out: 
     with output_directory(out) as folder, Progress(verb, stages=("inverse dynamics", "writing")) as progress:
         progress("inverse dynamics")
         gaps = {name: torque_gap(log, model) for name, log in logs.items()}
-        said = compare_torques(logs, gaps, model)
+        comparison = compare_torques(logs, gaps, model)
         progress("writing")
-        told = {name: dict(summary(gap)) for name, gap in gaps.items()}
-        content = next(iter(told.values())) if len(told) == 1 else {"format": 1, "logs": told, "compared": said}
+        summaries = {name: dict(summary(gap)) for name, gap in gaps.items()}
+        one = len(summaries) == 1
+        content = next(iter(summaries.values())) if one else {"format": 1, "logs": summaries, "compared": comparison}
         write_whole(folder / "torque_gap.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
-        torque_report(gaps, said, model).write(folder / "report.html")
+        torque_report(gaps, comparison, model).write(folder / "report.html")
     for assumed in dict.fromkeys(gap.assumed for gap in gaps.values() if gap.assumed):
         print(f"workbench {verb}: warning: {assumed}", file=sys.stderr)
     for name, gap in gaps.items():
         print(gap.table() if len(gaps) == 1 else f"{name}\n{gap.table()}")
-    if said:
-        print(said)
+    if comparison:
+        print(comparison)
     print(f"wrote {out}: report.html, torque_gap.json")
     return 0

@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.compare.compare_session import Run, provenance, roll_out
 from workbench.compare.comparison import compare_takes
+from workbench.compare.options import COMPARE
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
 from workbench.compare.session_takes import ReadTake, RegisteredTake, readable, register_take
@@ -85,13 +86,14 @@ def _by_first_motion(read: ReadTake) -> RegisteredTake:
     return register_take(replace(read, spec=replace(read.spec, starts_at=start)), None, None)
 
 
-def _first_motion(take: Take, least: float = np.deg2rad(1.0)) -> float:
-    """Time at which the first joint has left its first angles by `least` [rad], three frames in a row [s]."""
+def _first_motion(take: Take) -> float:
+    """Time [s] at which the first joint has left its first angle by `COMPARE.first_move`, three frames in a row; InputError if
+    none does."""
     first = np.nanmedian(take.q[: max(3, len(take) // 100)], axis=0)
-    away = np.nan_to_num(np.abs(take.q - first)).max(axis=1) > least
+    away = np.nan_to_num(np.abs(take.q - first)).max(axis=1) > COMPARE.first_move
     held = np.flatnonzero(away[:-2] & away[1:-1] & away[2:])
     if not len(held):
-        raise InputError(take.name, f"start: expected a joint that moves by more than {np.rad2deg(least):.0f} deg")
+        raise InputError(take.name, f"start: expected a joint that moves by more than {np.rad2deg(COMPARE.first_move):.0f} deg")
     return float(take.time[held[0]])
 
 

@@ -27,7 +27,7 @@ from workbench.types import Array, Progress, no_progress
 
 @dataclass(frozen=True)
 class Rollouts:
-    """One take simulated: as configured, with the step halved and then quartered, with the other contact model."""
+    """The rollouts of one take: as configured, with the step halved and then quartered, with the other contact model."""
 
     nominal: Take
     finer: tuple[Take, ...] = ()
@@ -98,10 +98,10 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
     return out
 
 
-def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int = 2, progress: Progress = no_progress
+def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, n_jobs: int, progress: Progress = no_progress
                     ) -> list[Rollouts]:
-    """Like `roll_out`, but the compiled station computes the finer steps of each run in which it supports the nominal step and
-    agrees with Drake there."""
+    """The same as `roll_out`, except that the compiled station computes the finer steps of each run in which it supports the
+    nominal step and agrees with Drake there."""
     done = roll_out(runs, config, progress=progress, n_jobs=n_jobs, finer=False)
     progress("simulating finer steps", None)
     nominal = [_job(run, replace(config, base=run.base, engine="auto")) for run in runs]

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare import metrics
 from workbench.compare.footfalls import foot_phases, force_phases
@@ -14,7 +13,7 @@ from workbench.compare.results import NAN, Channel, Comparison, Pair, TakeCompar
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 __all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "align", "compare_takes", "noise_of"]
 
@@ -65,9 +64,9 @@ def noise_of(takes: Sequence[Take]) -> Noise:
     for joint in dict.fromkeys(j for t in takes for j in t.joints):
         seen = [t for t in takes if joint in t.joints]
         joints[joint] = float(metrics.noise_at_rest([t.q[t.resting, t.column(joint)][:, None] for t in seen])[0])
-        told = [t.q_sigma[:, t.column(joint)] for t in seen if t.q_sigma is not None and not t.zeroed]
-        if told and np.isfinite(np.concatenate(told)).any():
-            joints[joint] = float(np.fmax(joints[joint], np.nanmedian(np.concatenate(told))))
+        sigmas = [t.q_sigma[:, t.column(joint)] for t in seen if t.q_sigma is not None and not t.zeroed]
+        if sigmas and np.isfinite(np.concatenate(sigmas)).any():
+            joints[joint] = float(np.fmax(joints[joint], np.nanmedian(np.concatenate(sigmas))))
     paths = [t.p_WB[t.resting] for t in takes if t.p_WB is not None]
     return Noise(joints, float(np.linalg.norm(metrics.noise_at_rest(paths))) if paths else NAN)
 
@@ -113,7 +112,7 @@ class _Takes:
         return Pair(of(self.recorded), simulated, floor, spread)
 
     @property
-    def use(self) -> NDArray[np.bool_]:
+    def use(self) -> Mask:
         """Frames after the first command."""
         return np.asarray(self.recorded.since_start >= 0)
 
@@ -167,7 +166,7 @@ def _heading_change(take: Take) -> float:
     return metrics.heading_change(take.quat_WB, take.since_start)
 
 
-def _walking(take: Take) -> NDArray[np.bool_]:
+def _walking(take: Take) -> Mask:
     end = np.inf if take.commands is None else take.commands.end
     return np.asarray((take.since_start >= 0) & (take.since_start <= end))
 

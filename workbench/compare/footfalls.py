@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.options import COMPARE
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, foot_points
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -22,8 +21,8 @@ class FootPhases:
     command's end (or the take's) in which it stands.
     """
 
-    stance: NDArray[np.bool_]
-    known: NDArray[np.bool_]
+    stance: Mask
+    known: Mask
     falls: Array
     duty: float
 
@@ -46,15 +45,16 @@ def foot_phases(take: Take, model: RobotModel) -> dict[str, FootPhases]:
     return out
 
 
-def force_phases(take: Take, least: float = 0.05) -> dict[str, FootPhases]:
-    """Stance of each foot from a simulation's contact forces: more than `least` of the mean total load."""
+def force_phases(take: Take) -> dict[str, FootPhases]:
+    """Stance of each foot from a simulation's contact forces: more than `COMPARE.stance_load` of the mean total load. Empty for a
+    take without forces."""
     if not take.contact:
         return {}
     load = {foot: f[:, 2] for foot, f in take.contact.items()}
     total = float(np.nanmean(np.sum(list(load.values()), axis=0)))
     if not total > 0:
         return {}
-    return {foot: _phases(take, f > least * total, np.isfinite(f)) for foot, f in load.items()}
+    return {foot: _phases(take, f > COMPARE.stance_load * total, np.isfinite(f)) for foot, f in load.items()}
 
 
 def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
@@ -86,7 +86,7 @@ def _rest_height(take: Take, heights: dict[str, Array]) -> float:
     return float(np.median(over)) if over else float("nan")
 
 
-def _phases(take: Take, stance: NDArray[np.bool_], known: NDArray[np.bool_]) -> FootPhases:
+def _phases(take: Take, stance: Mask, known: Mask) -> FootPhases:
     stance = _without_chatter(stance | ~known, take.time)
     end = take.starts_at + take.commands.end if take.commands is not None else take.time[-1]
     moving = (take.since_start >= 0) & (take.time <= end)
@@ -96,7 +96,7 @@ def _phases(take: Take, stance: NDArray[np.bool_], known: NDArray[np.bool_]) -> 
     return FootPhases(stance & known, known, falls, float(stance[use].mean()) if use.any() else float("nan"))
 
 
-def _without_chatter(stance: NDArray[np.bool_], time: Array) -> NDArray[np.bool_]:
+def _without_chatter(stance: Mask, time: Array) -> Mask:
     """Joins phases below SHORTEST to their neighbours, the shortest first; the first and the last phase are kept."""
     stance = stance.copy()
     while True:

@@ -12,23 +12,23 @@ from workbench.files.problem import CorrectedProblem
 from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
 
 
-def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
+def describe_logging(takes: Sequence[ReadTake]) -> dict[str, Any]:
     """For provenance: by take, the notes and the readings that were set aside; by joint, the servo law read from the duty
     register. Empty if there is nothing to report."""
     notes = {t.spec.name: list(t.recording.notes) for t in takes if t.recording.notes}
     laws = {joint: str(law) for joint, law in register_laws(takes).items()}
     found: dict[str, Any] = {"logs": notes} if notes else {}
-    aside = {t.spec.name: lines for t in takes if (lines := set_aside(t.recording.problems))}
+    aside = {t.spec.name: lines for t in takes if (lines := corrected_problems(t.recording.problems))}
     return found | ({"duty_registers": laws} if laws else {}) | ({"set_aside": aside} if aside else {})
 
 
-def set_aside(problems: Sequence[str]) -> list[str]:
+def corrected_problems(problems: Sequence[str]) -> list[str]:
     """The problems of a recording that report corrected readings, or readings excluded from the evidence."""
     return [text for text in problems if isinstance(text, CorrectedProblem)]
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:
-    """By joint, the servo law read from the duty register of all logs, if they have one."""
+    """The servo law of each joint, read from the duty register of all logs, if they have one."""
     logs: dict[str, list[RegisterLog]] = {}
     for t in takes:
         channels = t.recording.channels

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from workbench.compare.options import COMPARE, SPARC
 from workbench.types import Array, Mask
 
 
@@ -59,16 +60,16 @@ def correlation(a: Array, b: Array, use: Mask) -> Array:
     return np.asarray(np.divide((x * y).sum(axis=0), spread, out=np.full(len(spread), np.nan), where=spread > 1e-12))
 
 
-def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array, most: float = 0.2) -> Array:
+def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array) -> Array:
     """Time by which column a_j lags b_j [s], (n,): the shift of least RMS difference, interpolated between frames by a parabola.
     NaN for a column of b that moves less than 5 times `noise` (n,) (NaN: 1e-3 rad), or whose best shift lies at the edge of
-    +-`most` [s]. Both on the same `time` (N,).
+    +-`COMPARE.most_lag`. Both on the same `time` (N,) [s].
     """
     shown = use[:, None] & np.isfinite(b)
     moves = np.where(shown, b, -np.inf).max(axis=0) - np.where(shown, b, np.inf).min(axis=0)
     ready = moves > np.where(noise > 0, 5 * noise, 1e-3)
     step = max(float(np.median(np.diff(time))), 1 / 240)
-    shifts = np.arange(-int(most / step) - 1, int(most / step) + 2) * step
+    shifts = np.arange(-int(COMPARE.most_lag / step) - 1, int(COMPARE.most_lag / step) + 2) * step
     cost = np.full((len(shifts), a.shape[1]), np.nan)
     for j in np.flatnonzero(ready):
         seen = np.isfinite(b[:, j])
@@ -113,37 +114,37 @@ def heading_change(quat_WB: Array, since_start: Array) -> float:
     return float(displacement(np.column_stack([heading(quat_WB), np.zeros((len(quat_WB), 2))]), since_start)[0])
 
 
-def speed(time: Array, x: Array, window: float = 0.1) -> Array:
+def speed(time: Array, x: Array) -> Array:
     """Norm of the rate of columns (N, m), gaps bridged: (N,), NaN where nothing was seen.
 
-    The slope of a straight line over `window` [s] (Savitzky and Golay's first derivative).
+    The slope of a straight line over `COMPARE.speed_window` (Savitzky and Golay's first derivative).
     """
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(time)))
-    length = min(2 * max(1, round(window / step / 2)) + 1, len(time) - 1 + len(time) % 2)
+    length = min(2 * max(1, round(COMPARE.speed_window / step / 2)) + 1, len(time) - 1 + len(time) % 2)
     if length < 3 or not np.isfinite(x).any(axis=0).all():
         return np.full(len(time), np.nan)
     bridged = np.column_stack([np.interp(time, time[np.isfinite(c)], c[np.isfinite(c)]) for c in x.T])
     return np.asarray(np.linalg.norm(savgol_filter(bridged, length, 1, deriv=1, delta=step, axis=0), axis=1))
 
 
-def smoothness(time: Array, speed: Array, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float:
+def smoothness(time: Array, speed: Array) -> float:
     """Spectral arc length (SPARC) of a speed profile: minus the length of its normalised spectrum; 0 is smoothest.
 
     S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet: On the analysis of movement smoothness. J. NeuroEng.
-    Rehabil. 12:112, 2015, with that paper's cutoff [Hz], amplitude threshold and zero padding. Unlike jerk, it is robust to a
+    Rehabil. 12:112, 2015, with that paper's `SPARC`. Unlike jerk, it is robust to a
     recording's noise. NaN for a profile that is zero or shorter than four samples.
     """
     if len(speed) < 4 or not np.isfinite(speed).all() or not np.any(speed):
         return float("nan")
     rate = 1 / float(np.median(np.diff(time)))
-    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + SPARC.padding)
     spectrum = np.abs(np.fft.rfft(speed, size))
     frequency = np.fft.rfftfreq(size, 1 / rate)
-    spectrum = spectrum[frequency <= cutoff] / spectrum.max()
-    frequency = frequency[frequency <= cutoff]
-    above = np.flatnonzero(spectrum >= threshold)
+    spectrum = spectrum[frequency <= SPARC.cutoff] / spectrum.max()
+    frequency = frequency[frequency <= SPARC.cutoff]
+    above = np.flatnonzero(spectrum >= SPARC.threshold)
     inside = slice(above[0], above[-1] + 1)
     frequency, spectrum = frequency[inside], spectrum[inside]
     if len(frequency) < 2:

@@ -18,6 +18,17 @@ class CompareOptions:
     """A foot is off the ground above this share of the height at which the base rests: 1 mm for a puppy, five times what capture
     noise makes of a foot's height (0.2 mm in the practice sessions). On simulated walks the duty factor then lies within 0.04
     above that from contact forces."""
+    stance_load: float = 0.05
+    """A foot stands where it carries more than this share of the robot's mean load in the simulation: a quarter leg's worth is
+    five times as much."""
+    first_move: float = radians(1.0)
+    """A recording without commands starts where a joint has left its first angle by this [rad]: more than three counts of an
+    AX-12A."""
+    most_lag: float = 0.2
+    """Largest delay between recording and simulation that is searched for [s]; buses and servos delay by hundredths of a
+    second."""
+    speed_window: float = 0.1
+    """Span of the straight line whose slope is a speed [s]: a fifth of a gait's cycle."""
     shortest: float = 0.03
     """Stance or swing shorter than this is chatter, not a step [s]."""
     fell_tilt: float = radians(60.0)
@@ -60,5 +71,18 @@ class FileLimits:
     """Share of the joints seen that move so."""
 
 
+@dataclass(frozen=True)
+class SparcOptions:
+    """The spectral arc length's own numbers, from its paper (Balasubramanian et al. 2015)."""
+
+    cutoff: float = 10.0
+    """Highest frequency that counts [Hz]."""
+    threshold: float = 0.05
+    """Amplitude, as a share of the largest, below which the spectrum has ended."""
+    padding: int = 4
+    """Zero padding: the spectrum has 2^padding times the points of the next power of two."""
+
+
 COMPARE = CompareOptions()
+SPARC = SparcOptions()
 FILES = FileLimits()

@@ -82,8 +82,8 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
 def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
     """The yaw [rad] of a session of predictions alone, from where the bodies stand: good to some degrees, as pivots lie
     anywhere on their links. InputError where that does not give it."""
-    told = [layout_yaw(tracks_of(start), session.model) for start in starts]
-    known = [yaw for yaw in told if yaw is not None]
+    yaws = [layout_yaw(tracks_of(start), session.model) for start in starts]
+    known = [yaw for yaw in yaws if yaw is not None]
     if not known:
         raise InputError(session.path, "yaw: is missing, and cannot be found from takes, nor from where the bodies of the "
                          "start files stand")
@@ -107,7 +107,7 @@ class _Captured:
 
     @property
     def time(self) -> Array:
-        """Of the frames, from the start file's first [s]."""
+        """Times of the frames, counted from the start file's first [s]."""
         assert self.spec.frames is not None
         return np.arange(self.spec.frames) / self.start.rate
 

@@ -142,7 +142,7 @@ class Comparison:
         return write_whole(path, self.to_json())
 
     def table(self) -> str:
-        """The same for a person: a line for each take, then its joints, the worst first."""
+        """The comparison as text: a line for each take, then its joints, the worst first."""
         lines = []
         for take in self.takes:
             sigma = f" ± {1e3 * take.starts_at_sigma:.1f} ms" if math.isfinite(take.starts_at_sigma) else ""
@@ -178,15 +178,20 @@ def _plain(value: float) -> float | None:
     return float(f"{value:.7g}") if math.isfinite(value) else None
 
 
+def _scale(unit: str) -> float:
+    """Factor from radians to degrees; 1 for the units that stay."""
+    return 180 / math.pi if unit == "deg" else 1.0
+
+
 def _channel(c: Channel, unit: str) -> dict[str, Any]:
-    scale = 180 / math.pi if unit == "deg" else 1.0
+    scale = _scale(unit)
     out: dict[str, Any] = {k: _plain(scale * getattr(c, k)) for k in ("error", "noise", "floor")}
     out |= {"unit": unit, "spread": _plain(scale * c.spread)}
     return out if unit == "m" else out | {"correlation": _plain(c.correlation), "lag": _plain(c.lag)}
 
 
 def _pair(p: Pair, unit: str) -> dict[str, Any]:
-    scale = 180 / math.pi if unit == "deg" else 1.0
+    scale = _scale(unit)
     return {k: _plain(scale * getattr(p, k)) for k in ("recorded", "simulated", "floor", "spread")} | {"unit": unit}
 
 

@@ -58,7 +58,7 @@ class TakeSpec:
 
 @dataclass(frozen=True)
 class PredictSpec:
-    """To predict: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+    """What is to be predicted: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
 
     name: str
     motion: Path | None = None
@@ -181,8 +181,8 @@ def _entry_name(f: Fields) -> str:
 
 def _base(f: Fields, model: RobotModel) -> Base:
     """"free" or "fixed"; as is usual for the robot if the take does not say."""
-    said = f.text("base", choices=("free", "fixed"))
-    base: Base = model.usual_base if said is None else "fixed" if said == "fixed" else "free"
+    given = f.text("base", choices=("free", "fixed"))
+    base: Base = model.usual_base if given is None else "fixed" if given == "fixed" else "free"
     try:
         model.check_base(floating=base == "free")
     except InputError as e:

@@ -1,4 +1,4 @@
-"""Frames on the PC link and over ZigBee, as the controller's program sends and takes them (layout in docs/robot.md)."""
+"""Frames on the PC link and over ZigBee, as the controller's program sends and receives them (layout in docs/robot.md)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ SYNC = b"\xa5\x5a"
 PAYLOAD = 204
 """Longest payload of a frame [bytes]."""
 HEAD = 5
-"""Of a frame: two bytes, type, number, length."""
+"""Length of a frame's head [bytes]: SYNC, type, number, length of the payload."""
 
 
 class FrameType(IntEnum):
-    """Type of a frame; from 0x80 on the controller's."""
+    """Type of a frame; types from 0x80 on come from the controller."""
 
     ASK = 0x01
     PLAY = 0x02
@@ -78,8 +78,9 @@ class Frame:
 
 @dataclass(frozen=True)
 class StateMessage:
-    """State of the controller since `time` [s of its own clock], the reason, the servo responsible (bus ID or None), the cause of
-    the last reset, fault of the last table, number of the last accepted table, battery [V]."""
+    """State of the controller since `time` [s on its own clock]. reason: why it was entered. servo: bus ID of the servo
+    responsible, or None. woke_from: cause of the last reset. table_fault: of the last table. accepted: number of the last
+    accepted table. battery [V]."""
 
     time: float
     state: ControllerState
@@ -93,8 +94,8 @@ class StateMessage:
 
 @dataclass(frozen=True)
 class AnswerMessage:
-    """What became of a frame of ours: its type and number, result in words, how many bytes of a table have come, whether
-    all is well."""
+    """The controller's answer to a frame: the frame's type and number, the result in words, how many bytes of a table have
+    arrived, and whether it was accepted (`well`)."""
 
     type: int
     number: int
@@ -105,7 +106,7 @@ class AnswerMessage:
 
 @dataclass(frozen=True)
 class SlowReading:
-    """What changes seldom of one joint: speed and load as the servo's registers hold them, voltage [V], temperature [deg C]."""
+    """Readings of one joint that are sent seldom: speed and load [register counts], voltage [V], temperature [deg C]."""
 
     joint: int
     speed: int
@@ -141,12 +142,12 @@ _SLOW = struct.Struct("<HHBB")
 
 
 def crc16(data: bytes) -> int:
-    """CCITT, start 0xFFFF."""
+    """CRC-16-CCITT, initial value 0xFFFF."""
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def frame(kind: int, payload: bytes = b"", number: int = 0) -> bytes:
-    """A frame's bytes; ValueError where the payload is too long."""
+def encode_frame(kind: int, payload: bytes = b"", number: int = 0) -> bytes:
+    """The bytes of a frame; ValueError where the payload is too long."""
     if len(payload) > PAYLOAD:
         raise ValueError(f"payload of {len(payload)} bytes; a frame takes {PAYLOAD}")
     body = bytes([kind, number, len(payload)]) + payload
@@ -154,14 +155,14 @@ def frame(kind: int, payload: bytes = b"", number: int = 0) -> bytes:
 
 
 class FrameReader:
-    """Finds whole frames with a right sum in a stream. What only began as a frame, as one that a reset cut off, is looked through
-    again: it may hold the beginning of others."""
+    """Finds whole frames with a valid checksum in a stream. Bytes that only began as a frame, such as one that a reset cut off,
+    are searched again: they may hold the beginning of others."""
 
     def __init__(self) -> None:
         self._pending = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Frame]:
-        """Frames that end in these bytes."""
+        """Adds bytes to the stream; yields the frames that end in them."""
         pending = self._pending
         pending += data
         while True:
@@ -177,8 +178,8 @@ class FrameReader:
             yield Frame(whole[0], whole[1], whole[3:-2])
 
 
-def message(got: Frame) -> Message | None:
-    """Content of a frame of the controller; None for types that are unknown here, or a payload that does not fit."""
+def decode_message(got: Frame) -> Message | None:
+    """The content of a frame from the controller; None for an unknown type, or a payload that does not fit its type."""
     try:
         if got.type == FrameType.STATE:
             return _state(got.payload)
@@ -204,12 +205,12 @@ def _answer(got: Frame) -> AnswerMessage:
 
 
 def log_bytes(joints: int) -> int:
-    """Of a whole LOG frame."""
-    return len(frame(FrameType.LOG, bytes(_LOG.size + 4 * joints + 3 * _SLOW.size)))
+    """Length of a LOG frame of so many joints [bytes]."""
+    return len(encode_frame(FrameType.LOG, bytes(_LOG.size + 4 * joints + 3 * _SLOW.size)))
 
 
 def _log(got: Frame) -> LogMessage:
-    """The number of a log frame is that of its joints."""
+    """A log frame's number is its number of joints."""
     n = got.number
     ms, took, state, pose, first, battery, answered = _LOG.unpack_from(got.payload)
     if len(got.payload) != _LOG.size + 4 * n + 3 * _SLOW.size:
@@ -224,9 +225,9 @@ def _log(got: Frame) -> LogMessage:
 
 
 def upload_frames(table: bytes, sequence: int, ramps: bool = False) -> list[bytes]:
-    """Frames that bring a table over: BEGIN, DATA in order, END. sequence: one more than the last taken, modulo 256. ramps: where
-    its first pose is out of reach, ramp there instead of refusing."""
+    """Frames that transfer a table: BEGIN, DATA in order, END. sequence: one more than the last accepted, modulo 256. ramps:
+    whether the controller ramps to a first pose that is out of reach, instead of refusing the table."""
     begin = struct.pack("<IIBB", len(table), binascii.crc32(table), sequence, int(ramps))
     step = PAYLOAD - 4
-    data = [frame(FrameType.DATA, struct.pack("<H", at) + table[at:at + step]) for at in range(0, len(table), step)]
-    return [frame(FrameType.BEGIN, begin), *data, frame(FrameType.END)]
+    data = [encode_frame(FrameType.DATA, struct.pack("<H", at) + table[at:at + step]) for at in range(0, len(table), step)]
+    return [encode_frame(FrameType.BEGIN, begin), *data, encode_frame(FrameType.END)]

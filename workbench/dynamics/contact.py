@@ -11,7 +11,11 @@ STICKING = 0.02
 AGAINST_SLIP = 100.0
 """Relative cost of force that does not oppose the slip: it is used only if the wrench requires it."""
 _CHUNK = 4096
+"""Samples that are solved at once: enough for numpy, few enough for the cache."""
 _ITERATIONS, _HALVINGS = 60, 30
+"""Limits of Newton's method and of its line search; it ends earlier, as soon as the gradient vanishes."""
+_SOLVED = 1e-10
+"""Gradient at which a sample is solved, as a share of 1 + its largest component."""
 
 
 def share_forces(wrench: Array, arms: Array, slip: Array, friction: Array, cost: Array, scale: Array) -> tuple[Array, Array]:
@@ -44,9 +48,9 @@ def share_forces(wrench: Array, arms: Array, slip: Array, friction: Array, cost:
         ease = 1 / cost[rows]
         cones = np.concatenate([G_drag, G], axis=1), np.concatenate([rest, np.broadcast_to(friction, ease.shape)], axis=1)
         f, r = _solve(wrench[rows] / scale, *cones, np.concatenate([ease, ease / AGAINST_SLIP], axis=1))
-        lawful, any_ = f[:, :C], f[:, C:]
-        forces[rows], residual[rows] = lawful + any_, r * scale
-        forces[rows, :, :2] += drag * lawful[..., 2:]
+        opposing, free = f[:, :C], f[:, C:]
+        forces[rows], residual[rows] = opposing + free, r * scale
+        forces[rows, :, :2] += drag * opposing[..., 2:]
     return forces, residual
 
 
@@ -59,7 +63,7 @@ def _drag(slip: Array, friction: Array) -> tuple[Array, Array]:
 
 
 def grasp(arms: Array) -> Array:
-    """Grasp matrices (N, C, 6, 3): wrench [moment, force] of a force at the arm's end."""
+    """Grasp matrices (N, C, 6, 3), which turn a force at the end of each arm (N, C, 3) [m] into a wrench [moment, force]."""
     G = np.zeros((*arms.shape[:2], 6, 3))
     x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
     G[..., 0, 1], G[..., 0, 2], G[..., 1, 0], G[..., 1, 2], G[..., 2, 0], G[..., 2, 1] = -z, y, z, -x, -y, x
@@ -72,7 +76,7 @@ def _solve(w: Array, G: Array, mu: Array, ease: Array) -> tuple[Array, Array]:
     flat = np.ascontiguousarray(G.transpose(0, 2, 1, 3)).reshape(len(G), 6, -1)
     r = np.zeros_like(w)
     f, value, gradient = _dual(r, w, flat, mu, ease)
-    tolerance = 1e-10 * (1 + np.abs(w).max(axis=1))
+    tolerance = _SOLVED * (1 + np.abs(w).max(axis=1))
     for _ in range(_ITERATIONS):
         rows = np.flatnonzero(np.abs(gradient).max(axis=1) > tolerance)
         if not len(rows):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 ORDER = 3
 _CHUNK = 20_000  # samples at once, so that ten minutes of 14 bodies stay below 100 MB
@@ -48,7 +48,7 @@ def differentiate(time: Array, y: Array, window: float) -> Derivatives:
     return Derivatives(fits[0], fits[1], fits[2], np.array(noise))
 
 
-def _fits(time: Array, seen: NDArray[np.bool_], window: float) -> Iterator[tuple[NDArray[np.int_], NDArray[np.int_], Array]]:
+def _fits(time: Array, seen: Mask, window: float) -> Iterator[tuple[NDArray[np.int_], NDArray[np.int_], Array]]:
     """Yields (rows, indices of their neighbours (r, w), coefficients (r, 3, w) of value and derivatives)."""
     half = window / 2 * (1 + 1e-9)
     first, last = np.searchsorted(time, time - half), np.searchsorted(time, time + half, side="right")

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from workbench.dynamics.contact import share_forces
@@ -15,15 +14,15 @@ from workbench.dynamics.machine import DEFAULT_FRICTION, Machine
 from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, torque_margin
 from workbench.dynamics.result import InverseDynamicsResult
 from workbench.dynamics.stance import dearness, floor_under
-from workbench.dynamics.trajectory import RobotTrajectory, smoothed
+from workbench.dynamics.trajectory import RobotTrajectory, smooth
 from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
-Stance = Mapping[str, NDArray[np.bool_]]
+Stance = Mapping[str, Mask]
 
 RECORDED_WINDOW, SIMULATED_WINDOW = 0.1, 0.02
 """Smoothing of takes [s]: the first turns 0.1 deg of noise at 120 Hz into about 2 rad/s², 0.013 N m of an AX-12's rotor; the
@@ -73,7 +72,8 @@ class InverseDynamics:
 
     def of(self, trajectory: RobotTrajectory, stance: Stance | None = None, floor: float | None = 0.0, name: str = "trajectory",
            ) -> InverseDynamicsResult:
-        """Of exact positions, velocities and accelerations. Base fixed: the trajectory's base may move, and the support moves it.
+        """Inverse dynamics of exact positions, velocities and accelerations. Base fixed: the trajectory's base may move, and the
+        support moves it.
 
         stance: foot -> (N,) bool, when feet are down; None: found from heights and speeds. floor: its height [m]; None: where the
         feet find it. InputError for a joint or foot that the model lacks.
@@ -85,7 +85,8 @@ class InverseDynamics:
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
     def of_motion(self, motion: Motion, cycles: int | None = None) -> InverseDynamicsResult:
-        """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a fixed base.
+        """Inverse dynamics of a motion whose angles are followed exactly (the thesis's smooth cubic, sampled at 240 Hz) on a
+        fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
@@ -101,7 +102,8 @@ class InverseDynamics:
     def of_take(self, take: Take, window: float | None = None, stance: Stance | None = None, floor: float | None = None,
                 rest: Mapping[str, float] | None = None, rest_rotation: Array | None = None,
                 draws: int | None = None) -> InverseDynamicsResult:
-        """Of a take, its positions smoothed and differentiated by cubics over `window` [s] (None: 0.1, or 0.02 if simulated).
+        """Inverse dynamics of a take, whose positions are smoothed and differentiated by cubics over `window` [s] (None: 0.1, or
+        0.02 if simulated).
 
         stance, floor as in `of`. rest: joint -> angle [rad] and rest_rotation (4,) wxyz: the pose and tilt in which a zeroed
         take rested (a Measurement's rest_pose and rest_rotation). Joints that the take did not see are held at their
@@ -119,7 +121,7 @@ class InverseDynamics:
         p, quat = self._base_path(take)
         if take.zeroed and take.base != "fixed" and rest_rotation is not None:
             quat = quaternions.multiply(quat, rest_rotation)
-        trajectory, noise = smoothed(take.time, self.model.joints, q, p, quat, window)
+        trajectory, noise = smooth(take.time, self.model.joints, q, p, quat, window)
         self._note_gaps(take, trajectory, problems)
         dear = self._dearness(trajectory, stance, floor)
         solution = self._solve(trajectory, dear)
@@ -134,7 +136,7 @@ class InverseDynamics:
         for _ in range(draws):
             turned = _rotate(quat, _normal(random, np.full(p.shape, noise.rotation)))
             moved = p + _normal(random, np.tile(noise.p, (len(take), 1)))
-            noisy = smoothed(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
+            noisy = smooth(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
             other = self._solve(noisy, dear)
             torque += (other.torque - solution.torque) ** 2 / draws
             residual += (other.residual - solution.residual) ** 2 / draws
@@ -205,26 +207,26 @@ class InverseDynamics:
     # ---- what a take holds -------------------------------------------------------------------------------------------------
 
     def _complete(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
-        """All joints in the model's order; those that the trajectory lacks at zero."""
+        """The trajectory with all joints in the model's order; those that it lacks are at zero."""
         self._check_joints("trajectory", trajectory.joints)
         missing = [j for j in self.model.joints if j not in trajectory.joints]
         q, v, a = (self._columns(trajectory.joints, values, 0.0) for values in (trajectory.q, trajectory.v, trajectory.a))
         full = replace(trajectory, joints=self.model.joints, q=q, v=v, a=a)
         return full, [f"{', '.join(missing)}: not given; held at zero"] if missing else []
 
-    def _angles(self, take: Take, rest: Mapping[str, float], problems: list[str]) -> tuple[Array, NDArray[np.bool_]]:
+    def _angles(self, take: Take, rest: Mapping[str, float], problems: list[str]) -> tuple[Array, Mask]:
         """Angles (N, n) [rad] of all joints, and which of them were seen (n,)."""
         self._check_joints(take.name, take.joints)
         q = self._columns(take.joints, take.q, np.nan)
         seen = np.asarray(np.isfinite(q).any(axis=0))
         unseen = [j for j, s in zip(self.model.joints, seen) if not s]
         held = np.zeros_like(q)
-        told = take.commands is not None and np.isfinite(take.starts_at)
-        if told:
+        commanded = take.commands is not None and np.isfinite(take.starts_at)
+        if commanded:
             assert take.commands is not None
             held = take.commands.reordered(self.model.joints).reference(take.since_start)
         if unseen:
-            problems.append(f"{', '.join(unseen)}: not seen; held at {'the commanded angle' if told else 'zero'}")
+            problems.append(f"{', '.join(unseen)}: not seen; held at {'the commanded angle' if commanded else 'zero'}")
         if take.zeroed:
             q = q + np.array([rest.get(j, 0.0) for j in self.model.joints])
             if not rest:

@@ -164,7 +164,7 @@ def _unmount(plant: MultibodyPlant, base: str) -> tuple[Array, Array]:
 
 
 def _foot_points(plant: MultibodyPlant, inspector: SceneGraphInspector, model: RobotModel) -> FootPoints:
-    """Of the links that are the model's feet."""
+    """Contact points of the links that are the model's feet."""
     feet = tuple(model.foot_links.values())
     rows = [(f, *point) for f, link in enumerate(feet) for point in _spheres(plant, inspector, link)]
     table = np.array(rows).reshape(-1, 6)

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
 from workbench.servo import ServoLaw
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 CREEP = 0.05
 """Joint speed [rad/s] below which Coulomb friction fades to zero with the speed: its direction at rest is not known."""
@@ -79,7 +78,7 @@ def servo_load(servo: ServoConstants, needed: Array, torque_left: Array, speed_l
         torque_sigma=_at_least(torque_left[seen], torque_sigma, seen), speed_sigma=_at_least(speed_left[seen], speed_sigma, seen))
 
 
-def _at_least(left: Array, sigma: Array | None, seen: NDArray[np.bool_]) -> float:
+def _at_least(left: Array, sigma: Array | None, seen: Mask) -> float:
     return 0.0 if sigma is None else float(np.nan_to_num(sigma[seen][np.argmin(left)]))
 
 

@@ -133,7 +133,7 @@ def _wrenches(result: InverseDynamicsResult) -> list[tuple[str, str, Array]]:
 
 
 def _factor(kind: str) -> float:
-    """From the library's radians to the file's degrees."""
+    """Factor from radians to the file's degrees; 1 for columns that are not angles."""
     return 180 / np.pi if kind in _ANGLES else 1.0
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.machine import FootPoints
 from workbench.files import InputError
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 TOUCH = 3e-3
 """Points up to this far above the floor may carry load [m]."""
@@ -34,7 +33,7 @@ def floor_under(places: Array, points: FootPoints) -> Array:
 
 
 def dearness(places: Array, velocities: Array, points: FootPoints, floor: Array,
-             stance: Mapping[str, NDArray[np.bool_]] | None) -> Array:
+             stance: Mapping[str, Mask] | None) -> Array:
     """Cost of force at each point (N, C): 1 on the floor, rising with the height above it, infinite without contact.
 
     places, velocities: (N, C, 3) [m, m/s] in W. Without `stance` a point is in contact if it is within TOUCH of its foot's

@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.dynamics.machine import Machine
 from workbench.dynamics.torque_log import TorqueLog
-from workbench.dynamics.trajectory import RobotTrajectory, smoothed
+from workbench.dynamics.trajectory import RobotTrajectory, smooth
 from workbench.robot import EffectSpec, RobotModel
 from workbench.types import Array
 
@@ -121,7 +121,7 @@ def _path(log: TorqueLog, model: RobotModel) -> RobotTrajectory:
         q[:, model.joints.index(joint)] = log.q[:, i]
     place = np.zeros((len(q), 3))
     level = np.tile([1.0, 0, 0, 0], (len(q), 1))
-    return smoothed(log.time, model.joints, q, place, level, _WINDOW)[0]
+    return smooth(log.time, model.joints, q, place, level, _WINDOW)[0]
 
 
 def _friction(speed: Array) -> Array:

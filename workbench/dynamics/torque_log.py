@@ -86,5 +86,5 @@ def _joints(source: str, keys: list[str], model: RobotModel) -> tuple[tuple[str,
         raise InputError(source, f"{len(keys)} joints; the robot has {len(model.joints)}: {' '.join(model.joints)}")
     from_base = [j for link in model.kinematics.links if (j := model.kinematics.joint_of(link)) in model.joints]
     chosen = tuple(str(j) for j in from_base[:len(keys)])
-    said = ", ".join(f"{key} is {joint}" for key, joint in zip(keys, chosen))
-    return chosen, f"columns without names were taken from the base on: {said}"
+    assignment = ", ".join(f"{key} is {joint}" for key, joint in zip(keys, chosen))
+    return chosen, f"columns without names were taken from the base on: {assignment}"

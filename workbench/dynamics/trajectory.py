@@ -60,17 +60,18 @@ class Noise:
     rotation: float
 
 
-def smoothed(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB: Array, window: float,
-             ) -> tuple[RobotTrajectory, Noise]:
-    """From samples of q (N, n), p_WB (N, 3) and quat_WB (N, 4) at times (N,), each smoothed and differentiated over `window`
-    [s] by `differentiate`, and the noise that their scatter shows."""
+def smooth(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_WB: Array, window: float,
+           ) -> tuple[RobotTrajectory, Noise]:
+    """A trajectory from samples of q (N, n) [rad], p_WB (N, 3) [m] and quat_WB (N, 4) wxyz at times (N,) [s], each smoothed and
+    differentiated over `window` [s] by `differentiate`, and the noise that their scatter shows."""
     quat, _ = quaternions.continuous(quat_WB)
     parts = differentiate(time, np.column_stack([q, p_WB, quat]), window)
     n = q.shape[1]
     joint, place, turn = (_columns(parts, which) for which in (slice(n), slice(n, n + 3), slice(n + 3, n + 7)))
     u, omega, alpha = angular_motion(turn.value, turn.first, turn.second)
-    trajectory = RobotTrajectory(time, joints, joint.value, joint.first, joint.second, place.value, u,
-                            np.column_stack([omega, place.first]), np.column_stack([alpha, place.second]))
+    trajectory = RobotTrajectory(
+        time, joints, joint.value, joint.first, joint.second, place.value, u, np.column_stack([omega, place.first]),
+        np.column_stack([alpha, place.second]))
     rotation = float(2 * np.sqrt(np.sum(turn.noise**2) / 3))  # a turn by d moves a quaternion by d/2; three directions of four
     return trajectory, Noise(joint.noise, place.noise, rotation)
 

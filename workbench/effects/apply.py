@@ -1,4 +1,4 @@
-"""Applies a model's effects: the result is what stations are built from and motions are played with."""
+"""Applies a model's effects, to the description of the robot and to its commands."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from workbench.servo import ServoLaw, ServoTerm, nominal_terms
 from workbench.types import Array
 
 KEPT_BUILDS = 64
-"""Number of changed descriptions that are kept: more than a fit compares at once."""
+"""Number of changed descriptions in the cache: more than a fit compares at once."""
 
 
 @dataclass(frozen=True)
 class Physics:
     """Nominal physics and effects together. build: the changed SDF, None where it is the model's file. foot_friction: pair
-    coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
+    coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle minus servo angle.
     tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
     hard ends were added, which continuous plants ignore. terms: of the servos, by effects. retimed: whether a servo's delay or
-    an effect changes when commands are heard, or which."""
+    an effect changes the commands or their times."""
 
     build: SdfRobot | None
     law: ServoLaw
@@ -110,8 +110,8 @@ _builds: Cache[SdfRobot] = Cache(KEPT_BUILDS)
 
 
 def _apply_to_sdf(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
-    """The model's SDF with these effects on its description; the same object for the same ones, as most robots of a search differ
-    in their servos alone. Another package's effect may look at all of the model, so that nothing is shared with it."""
+    """The model's SDF with these effects applied to its description; the same object for the same effects, as most robots of a
+    search differ only in their servos. An effect of another package may depend on the whole model, so its SDF is not shared."""
     own = all(type(effect).__module__.startswith(f"{__package__}.") for effect, _ in changes)
 
     def build() -> SdfRobot:
@@ -122,8 +122,8 @@ def _apply_to_sdf(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]
 
     if not own:
         return build()
-    said = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
-    return _builds.get((model.path, model.path.stat().st_mtime_ns, said), build)
+    key = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
+    return _builds.get((model.path, model.path.stat().st_mtime_ns, key), build)
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
@@ -131,8 +131,8 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
-    """The commands on which the servos act: those sent, goals delayed as in the nominal law, and changed by effects. A servo that
-    delays its goals still lets go at once: the duty register of an STS3215 is zero in the row that switches it off."""
+    """The commands on which the servos act: those that were sent, with goals delayed according to the nominal law, and changed by
+    effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
         commands = delay_commands(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
@@ -142,7 +142,7 @@ def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
 
 
 def apply_to_measurement(measurement: Measurement, model: RobotModel) -> Measurement:
-    """How the cameras look at a robot with these effects."""
+    """The measurement of a robot with these effects."""
     for effect, spec, _ in resolve(model):
         measurement = effect.measurement(measurement, spec)
     return measurement

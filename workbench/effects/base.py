@@ -1,8 +1,8 @@
-"""The base class of effects: one piece of physics beyond the nominal model, with hooks for everything it may change.
+"""The base class of effects. An effect is a piece of physics beyond the nominal model, with hooks for everything it may change.
 
 An effect is one file with one subclass of Effect and its instance EFFECT. It has no state: all state is in EffectSpec. A station
-calls the hooks for the description (SDF), law (servo constants), servo terms, ground, gravity and forces, a run that for the
-commands, a comparison that for the measurement. Another package adds effects through entry points in the group
+calls the hooks for the description (SDF), law (servo constants), servo terms, ground, gravity and forces; a run calls the hook
+for the commands, and a comparison the one for the measurement. Other packages add effects through entry points in the group
 "workbench.effects" that name an Effect instance.
 """
 
@@ -21,7 +21,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
@@ -30,31 +30,34 @@ Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
-"""Effects that act almost alike until data separate them: if no member is certain, the family may be."""
+"""Groups of effects with almost the same response: the family may be certain even if none of its members is."""
 Tie = Literal["gravity against torque", "less torque at full duty"]
-"""Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so that only the
-ratio of gravity to torque is known; and a torque that saturates, bends or sags with duty has the same effect."""
+"""Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so only the
+ratio of gravity to torque is known; and a limit, saturation or supply sag at high duty all reduce the torque in the same way."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
 """Ways to estimate an effect directly from the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
 REACH = 2.0
-"""Values beyond this multiple of the one that one in a hundred exceeds are implausible."""
+"""Values beyond this multiple of the 99th percentile (`seldom_beyond`) are implausible."""
 NEAR, BEYOND = 0.08, 0.8
-"""Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
+"""NEAR: fraction of the nominal value by which the typical value has to be lower; BEYOND: otherwise, this fraction of the
+nominal value is used instead."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect, in the unit of docs/formats.md; multiply by `si` for SI. low, high: physically possible range.
-    typical: size from which it is noticeable on a small robot; fits start there and screening uses it as its step. vector: three
-    numbers. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
-    replaces a value of the nominal robot, which is then neutral. resolution: least standard deviation that any recording can
-    give, since every model leaves that much open. option: name of the optional part of the effect to which it belongs; empty: it
-    is always given. seldom_beyond: value that one in a hundred servos (or robots) with the effect exceeds, for a vector its
-    length, with the reason in a comment; priors and reach follow from it. logarithmic: a ratio whose size is its logarithm, so
-    that 2 and 1/2 are equally large."""
+    """A parameter of an effect, in the unit of docs/formats.md; multiply by `si` for SI.
+
+    low, high: physically possible range. typical: size from which it is noticeable on a small robot; fits start there and
+    screening uses it as its step. vector: three numbers. shapes: it affects only the shape of the effect (for example the speed
+    at which friction decays); its typical value is then neutral. replaces: it replaces a value of the nominal robot, which is
+    then neutral. resolution: smallest standard deviation that any recording can give, because models are uncertain by that much.
+    option: name of the optional part of the effect to which it belongs; empty: it is always given. seldom_beyond: value that one
+    in a hundred servos (or robots) with the effect exceeds (for a vector, its length), with the reason in a comment; priors and
+    reach follow from it. logarithmic: a ratio whose size is its logarithm, so that 2 and 1/2 are equally large.
+    """
 
     name: str
     unit: str
@@ -71,8 +74,8 @@ class Parameter:
     logarithmic: bool = False
 
     def typical_beside(self, neutral: float) -> float:
-        """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
-        that is so near, or less, that the step between them would show nothing of this, one beyond."""
+        """The typical value. If it replaces a nominal value, it is lower than usual (a weak supply, a slippery floor); if the
+        nominal value is close to it or below it, a value below nominal is used instead, since the step would be too small."""
         near = self.replaces and self.typical > (1 - NEAR) * neutral
         return BEYOND * neutral if near else self.typical
 
@@ -84,8 +87,8 @@ class Parameter:
 @dataclass(frozen=True)
 class Registers:
     """Readings of the servos' own registers in one log, NaN where there are none. duty, nominal_duty: by joint, (N,), duty of the
-    servo's H-bridge, and of the nominal law at the logged error, before it is limited to 1. voltage (N,) [V], None where it was
-    not logged."""
+    servo's H-bridge, and of the nominal law at the logged error, before it is limited to 1. voltage (N,) [V], None if it was not
+    logged."""
 
     duty: Mapping[str, Array]
     nominal_duty: Mapping[str, Array]
@@ -95,8 +98,8 @@ class Registers:
 class Effect:
     """Base class of effects; hooks do nothing unless overridden. `values` are in SI, by parameter name.
 
-    An effect must define name, layer, places, parameters and `sentence`. It may describe itself to the search, which knows
-    no effect by its name: the class variables from `under_load` on, `as_other`, `could_act` and `reach`.
+    An effect must define name, layer, places, parameters and `sentence`. The search does not refer to effects by name; the class
+    variables from `under_load` on, `as_other`, `could_act` and `reach` describe an effect to it.
     """
 
     name: ClassVar[str]
@@ -104,63 +107,65 @@ class Effect:
     places: ClassVar[tuple[Place, ...]]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     title: ClassVar[str] = ""
-    """Readable name, if it is not the name with spaces for underscores."""
+    """Readable name; default: the name with spaces for underscores."""
     family: ClassVar[Family | None] = None
-    """The family of effects with which it is easily confused; None: it has no family."""
+    """The family of effects with which it is easily confused, if any."""
     under_load: ClassVar[bool] = False
-    """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
+    """Whether it is observable only where joints carry load: with hanging legs, on a stand, an effect seen in a walk may not
+    show."""
     needs_steady_load: ClassVar[bool] = False
-    """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
+    """Whether a servo log distinguishes it from inertia and friction only if gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True
-    """Whether a robot whose base is held can show it; not what only the floor does to feet."""
+    """Whether a robot whose base is held can show it; false for effects between floor and feet."""
     hidden_by_zeroing: ClassVar[bool] = False
-    """Whether it leaves no trace in the angles of its own joint where these are zeroed in neutral, only in what gravity and
-    ground make of it."""
+    """Whether it does not appear in the angles of its own joint if these are zeroed in neutral, but only through gravity and
+    ground."""
     like_a_late_start: ClassVar[bool] = False
-    """Whether, acting on all joints, it looks like a later first command: only a known start separates the two."""
+    """Whether, acting on all joints, it looks like a later first command; only a known starting time separates the two."""
     reduces_to: ClassVar[str] = ""
-    """The nested effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none
-    does, where it is small."""
+    """The nested effect, with no more parameters, to which it reduces at the limit of a parameter that only shapes it or, without
+    such a parameter, when it is small."""
     equivalent_to: ClassVar[tuple[str, ...]] = ()
     """Observationally equivalent effects: no walk separates it from them, as their motions differ by less than those of two
-    simulators do."""
+    simulators."""
     includes: ClassVar[tuple[str, ...]] = ()
-    """Effects at the same joint or link that are special cases of it, and so are never added to it."""
+    """Effects at the same joint or link that are special cases of it, and are therefore never combined with it."""
     tied: ClassVar[Tie | None] = None
-    """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
+    """The tie whose members cannot be distinguished from a servo's own angles; a joint gets at most one of them."""
     resembles: ClassVar[Tie | None] = None
-    """A tie of which it is no member, as a joint may have both, but whose effects it can look like: where one of them, or it, is
-    found, all are compared."""
+    """A tie whose effects it resembles without being a member (a joint may have both): if it or one of them is found, all are
+    compared."""
     steady_pull: ClassVar[bool] = False
-    """Whether it is a steady force on the robot: of several such effects all but one only compensate for the imperfect fit of
-    that one."""
+    """Whether it is a constant force on the robot: of several such effects, all but one only compensate for that one's imperfect
+    fit."""
     point_mass: ClassVar[bool] = False
-    """Whether its numbers are a mass and where it sits on a link, which are fitted as mass and moments."""
+    """Whether its parameters are a mass and its position on a link, which are fitted as mass and first moments."""
     moves_center: ClassVar[bool] = False
-    """Whether all that it does is to move a link's centre of mass, which tips a robot as much wherever that link hangs."""
+    """Whether it only moves a link's centre of mass, which tips the robot by the same amount wherever that link is."""
     moves_feet: ClassVar[bool] = False
-    """Whether it makes feet stand elsewhere than drawn, much as a centre of mass does that lies elsewhere."""
+    """Whether it moves the feet relative to the body, which resembles a displaced centre of mass."""
     free_play: ClassVar[str] = ""
-    """The parameter that says how far a link turns freely against its servo, if it does [rad in SI]."""
+    """The parameter with the angle by which a link turns freely relative to its servo, if it does [rad in SI]."""
     estimator: ClassVar[Estimator | None] = None
-    """How it is read off the recordings without a search, if it is. Parameters that this takes: of an end of travel the lower and
-    the upper end, of play across the axis the play and its axis, of a turn of an asset a rotation vector, else one number."""
+    """How it is estimated directly from the recordings, without a search, if it is. Parameters: for "end of travel" the lower
+    and the upper end, for "play across the axis" the play and its axis, for "turn of an asset at rest" a rotation vector,
+    otherwise one number."""
     from_neutral: ClassVar[bool] = True
-    """Whether a search from neutral finds it: a stop shows nothing until the joint meets it, and of loose screws the axis has to
-    be known first. If not, it needs an estimator."""
+    """Whether a search from neutral can find it. If not, it needs an estimator: a stop has no effect until the joint reaches it,
+    and for a loose mount the axis has to be known first."""
 
     def sentence(self, spec: EffectSpec) -> str:
-        """One readable sentence: how this robot differs from nominal."""
+        """One readable sentence that describes how this robot differs from nominal."""
         raise NotImplementedError
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         """The values, in the units of docs/formats.md, at which the effect vanishes: infinity for a stiffness or a ceiling, the
-        typical value for a number that only shapes the effect, the robot's own for one that replaces it."""
+        typical value for a parameter that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        """The values at which the effect `name` (`reduces_to`, or of `equivalent_to`) does nearly the same at the same place, in
-        the formats page's units; empty where that is not known."""
+        """The values at which the effect `name` (`reduces_to`, or one of `equivalent_to`) acts nearly the same way at the same
+        joint or link, in the units of docs/formats.md; empty if unknown."""
         return ()
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
@@ -168,10 +173,10 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """Largest plausible distance of its parameters from neutral on this robot (`Parameter.distance`), in the units of
-        docs/formats.md, for a vector its length: a search moves no parameter further, and rejects it for servo logs if it would
-        go beyond. REACH times the value that one in a hundred exceeds, where all parameters define that; unlimited for an effect
-        that vanishes at infinity."""
+        """Largest plausible distance of its parameters from neutral on this robot (`Parameter.distance`; for a vector its
+        length), in the units of docs/formats.md. A search moves no parameter further and, for servo logs, rejects the effect if
+        a parameter would go beyond. REACH times `seldom_beyond` if all parameters define it; unlimited for an effect that
+        vanishes at infinity."""
         neutral = iter(self.neutral(model))
         away = []
         for p in self.parameters:
@@ -184,19 +189,19 @@ class Effect:
         """Changes the robot's SDF."""
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
-        """Servo constants of the joints in `columns` changed."""
+        """Changes servo constants of the joints in `columns`."""
         return law
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm | None:
-        """What servos do beyond constants; here (n,): the servos named in `where`. None: nothing."""
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm | None:
+        """Behaviour of servos beyond constants; here (n,): the servos named in `where`. None: nothing."""
         return None
 
     def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
-        """The floor changed."""
+        """Changes the floor."""
         return ground
 
     def foot_friction(self, values: Mapping[str, float]) -> float | None:
-        """Friction of the pair foot and ground, for the feet named in `where`; None: unchanged."""
+        """Friction coefficient between foot and ground, for the feet named in `where`; None: unchanged."""
         return None
 
     def foot_stiffness(self, values: Mapping[str, float]) -> float | None:
@@ -204,11 +209,11 @@ class Effect:
         return None
 
     def zero(self, values: Mapping[str, float]) -> float:
-        """Link angle less servo angle [rad] of the joints named in `where`."""
+        """Link angle minus servo angle [rad] of the joints named in `where`."""
         return 0.0
 
     def gravity(self, gravity: Array, values: Mapping[str, float]) -> Array:
-        """Gravity (3,) [m/s^2] in the floor's frame changed."""
+        """Changes gravity (3,) [m/s^2] in the floor's frame."""
         return gravity
 
     def tether(self, values: Mapping[str, float]) -> Array | None:
@@ -216,16 +221,16 @@ class Effect:
         return None
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
-        """What reaches the servos, and when, changed."""
+        """Changes the commands that reach the servos, or their times."""
         return commands
 
     def measurement(self, measurement: Measurement, spec: EffectSpec) -> Measurement:
-        """How the robot is seen changed."""
+        """Changes how the robot is observed."""
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the unit of docs/formats.md, as the servos' own registers tell it, and the standard error; None
-        where they do not."""
+        """Its first parameter, in the unit of docs/formats.md, estimated from the servos' own registers, and its standard error;
+        None if they do not determine it."""
         return None
 
 
@@ -244,8 +249,8 @@ def scalar(spec: EffectSpec, name: str) -> float:
 
 
 def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
-    """Scalar parameters of a spec in SI, those of options left out at their neutral value; InputError names one that is missing,
-    unknown, or out of range."""
+    """Scalar parameters of a spec in SI; parameters of omitted optional parts have their neutral value. InputError names a
+    parameter that is missing, unknown, or out of range."""
     out: dict[str, float] = {}
     for p in effect.parameters:
         if p.name not in spec.parameters:
@@ -255,7 +260,8 @@ def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
             raise InputError(None, f"effect '{spec.effect}': parameter '{p.name}' [{p.unit}] is missing")
         value = spec.parameters[p.name]
         if p.vector != isinstance(value, tuple):
-            raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {'three numbers' if p.vector else 'one number'}")
+            wanted = "three numbers" if p.vector else "one number"
+            raise InputError(None, f"effect '{spec.effect}': '{p.name}': expected {wanted}")
         for v in value if isinstance(value, tuple) else (value,):
             if not p.low <= v <= p.high:
                 raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {v:g} {p.unit}; expected {p.low:g} to {p.high:g}")
@@ -275,14 +281,14 @@ def vector(values: Mapping[str, float], name: str) -> Array:
 
 
 def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
-    """InputError unless `where` names parts that the model has and the effect can act on."""
+    """Raises InputError unless `where` names parts of the model on which the effect can act."""
     k = model.kinematics
     known: dict[str, tuple[str, ...]] = {
         "joint": model.joints, "foot": tuple(model.foot_links), "link": k.links, "rigid_body": tuple(model.rigid_bodies),
         "robot": ()}
     if not spec.where:
         if "robot" not in effect.places:
-            raise InputError(None, f"effect '{spec.effect}': where is empty; expected one {' or '.join(effect.places)}")
+            raise InputError(None, f"effect '{spec.effect}': where: is empty; expected a {' or '.join(effect.places)}")
         return
     allowed = {name for place in effect.places for name in known[place]}
     for name in spec.where:

@@ -27,9 +27,9 @@ def _problems(effect: Effect) -> Iterator[str]:
     if not isinstance(effect.name, str) or not effect.name.isidentifier():
         yield f"name: expected letters, digits and underscores, got {effect.name!r}"
     for key, words in _WORDS.items():
-        said = getattr(effect, key)
-        if said not in get_args(words) and not (said is None and key != "layer"):
-            yield f"{key}: expected one of {', '.join(get_args(words))}, got {said!r}"
+        value = getattr(effect, key)
+        if value not in get_args(words) and not (value is None and key != "layer"):
+            yield f"{key}: expected one of {', '.join(get_args(words))}, got {value!r}"
     if not isinstance(effect.places, tuple) or not effect.places or not set(effect.places) <= set(get_args(Place)):
         yield f"places: expected a tuple of some of {', '.join(get_args(Place))}, got {effect.places!r}"
     if type(effect).sentence is Effect.sentence:
@@ -41,11 +41,11 @@ def _problems(effect: Effect) -> Iterator[str]:
             yield (f"parameter '{p.name}': expected low <= typical <= high, low < high, si not 0; got low {p.low:g}, "
                    f"typical {p.typical:g}, high {p.high:g}, si {p.si:g}")
     if len({p.name for p in effect.parameters}) < len(effect.parameters):
-        yield "parameters: expected names that differ"
+        yield "parameters: expected different names"
 
 
 def answering_for(effect: Effect, at: str) -> Effect:
-    """The same effect; what its own hooks raise becomes an InputError that names `at`, the effect and the hook."""
+    """The same effect; an exception in one of its hooks becomes an InputError that names `at`, the effect and the hook."""
     for hook in HOOKS:
         if getattr(type(effect), hook) is not getattr(Effect, hook):
             object.__setattr__(effect, hook, partial(_call_hook, effect, hook, at))

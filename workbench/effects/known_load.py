@@ -1,4 +1,4 @@
-"""A weight of known mass that hangs on a link in one take."""
+"""A weight of known mass, attached to a link in one take."""
 
 from __future__ import annotations
 

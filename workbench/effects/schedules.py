@@ -10,11 +10,11 @@ import numpy as np
 from workbench.motion.commands import Commands
 
 LOOP = 2e-3
-"""Uncertainty of the time between a command's stated time and its use in the servo's loop [s]: simulators and firmwares differ by
-that much, so that every model may start that much sooner or later, and no delay is known better."""
+"""Uncertainty of the delay between a command's time stamp and its use in the servo's loop [s]. Simulators and firmwares differ by
+this much, so every model may start this much sooner or later, and no delay is known better."""
 
 SAME = 1e-9
-"""Instants no further apart are one [s]."""
+"""Instants at most this far apart are treated as one [s]."""
 
 
 def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
@@ -27,9 +27,9 @@ def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Com
 
 
 def delay_commands(commands: Commands, columns: Iterable[int], late: float, switched: bool = True) -> Commands:
-    """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last. Until the first one
-    it is in neutral, or, where commands had begun before, at the first one's goal. switched: whether the servo is switched on and
-    off so much later as well."""
+    """The commands of some columns `late` seconds later; until its next command, a joint keeps its last one. Before the first
+    command it is in neutral or, if commands had begun before, at the goal of the first. switched: whether switching the servo on
+    and off is delayed, too."""
     columns = list(columns)
     if not late:
         return commands
@@ -38,7 +38,7 @@ def delay_commands(commands: Commands, columns: Iterable[int], late: float, swit
         later = replace(commands, times=commands.times + late, end=commands.end + late)
         return _since(later, commands.times[0]) if commands.begun and late > 0 else later
     own = [commands.goals[:, columns], commands.speeds[:, columns], commands.enabled[:, columns]]
-    changes = np.zeros(len(commands.times), dtype=bool)  # else instants double with each joint
+    changes = np.zeros(len(commands.times), dtype=bool)  # otherwise the number of instants doubles with each joint
     for values, neutral in zip(own if switched else own[:2], (0.0, 0.0, True)):
         earlier = values[:1] if commands.begun else np.full_like(values[:1], neutral)
         changes |= (values != np.vstack([earlier, values[:-1]])).any(axis=1)
@@ -62,7 +62,7 @@ def delay_commands(commands: Commands, columns: Iterable[int], late: float, swit
 
 
 def _since(commands: Commands, time: float) -> Commands:
-    """Commands whose first goals are there from `time` [s] on."""
+    """Commands whose first goals apply from `time` [s] on."""
     rows = np.concatenate([[0], np.arange(len(commands.times))])
     return replace(commands, times=np.concatenate([[time], commands.times]), goals=commands.goals[rows],
                    speeds=commands.speeds[rows], enabled=commands.enabled[rows], poses=commands.poses[rows])

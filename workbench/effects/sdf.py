@@ -21,25 +21,25 @@ GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
 """Mass and inertia of the link between servo and link [kg, kg m^2]: small compared with any robot, large enough for the solver.
 The gear's inertia at the joint is the servo's reflected inertia, which stays on the servo's joint."""
 SPRING_TIME = 1e-3
-"""Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
-they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME.
-For longer steps the station adds damping."""
+"""Ratio of a gear spring's damping to its stiffness [s]. Drake integrates springs explicitly and joint damping implicitly;
+together they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with
+d = k SPRING_TIME. For longer steps the station adds damping."""
 PLAY_DAMPING = 5e-4
-"""Of a gear's play [N m s/rad]: a link that swings in it comes to rest in seconds, and a servo that moves at 3 rad/s drags
-it along with a mere 1.5 mN m."""
+"""Damping inside a gear's play [N m s/rad]: a link that swings in it comes to rest within seconds, and a servo that moves at
+3 rad/s drags it along with only 1.5 mN m."""
 DRAKE = "{http://drake.mit.edu}"
 
 KEPT = 64
-"""Number of kinematic trees that are kept."""
+"""Number of kinematic trees in the cache."""
 _kinematics: Cache[Kinematics] = Cache(KEPT)
 
 
 class SdfRobot:
     """An SDF file in memory; each method changes one thing about the robot. Lengths m, angles rad.
 
-    stages: by servo joint, the joints put between its servo and its link, from the servo on. They turn at the servo joint's
-    own frame; the servo joint keeps its name, and sees the servo's side. moved: link lengths differ from the file's. ends: some
-    joint has got hard ends.
+    stages: by servo joint, the joints inserted between its servo and its link, starting at the servo. They have the frame of the
+    servo joint; the servo joint keeps its name and is on the servo's side. moved: link lengths differ from the file's. ends: some
+    joint was given hard ends.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,7 +48,7 @@ class SdfRobot:
         self.root = deepcopy(_parse(path, path.stat().st_mtime_ns))
         model = self.root.find("model")
         if model is None:
-            raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
+            raise InputError(self.source, "no <model>: effects that change the robot's structure need an SDF file")
         self._model = model
         self.stages: dict[str, tuple[str, ...]] = {}
         self._built: list[object] = [path, path.stat().st_mtime_ns]
@@ -56,18 +56,18 @@ class SdfRobot:
         self._link_of = {j.get("name", ""): j.findtext("child", "").strip() for j in model.findall("joint")}
 
     def text(self) -> str:
-        """The changed SDF, its relative files made absolute."""
+        """The changed SDF, with relative paths made absolute."""
         for uri in self._model.iter("uri"):
-            if uri.text and "://" not in uri.text:  # of a text without a file Drake takes neither relative nor absolute paths
+            if uri.text and "://" not in uri.text:  # from text without a file, Drake accepts neither relative nor absolute paths
                 uri.text = f"file://{(self.path.parent / uri.text.strip()).resolve()}"
         return ElementTree.tostring(self.root, encoding="unicode")
 
     def kinematics(self) -> Kinematics:
-        """Of the robot as it is now, but for its masses; parsed once for the same changes of joints and lengths."""
+        """Kinematics of the robot as changed so far, except for its masses; cached by its changes of joints and lengths."""
         return _kinematics.get(tuple(self._built), lambda: Kinematics.from_text(self.text(), self.path))
 
     def add_play(self, joint: str, gap: float) -> None:
-        """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""
+        """The link turns freely by `gap` in total about the joint's axis, half to each side of the servo."""
         if gap > 0:
             self._add_stage(joint, self._joint(joint).find("axis/xyz"), (-gap / 2, gap / 2))
 
@@ -76,7 +76,7 @@ class SdfRobot:
         self._add_stage(joint, self._joint(joint).find("axis/xyz"), None, stiffness)
 
     def add_loose_mount(self, joint: str, play: float, axis: Array) -> None:
-        """The link turns freely by `play` in all about `axis` (3,), in the link's frame, through the joint's origin."""
+        """The link turns freely by `play` in total about `axis` (3,), in the link's frame, through the joint's origin."""
         frame = self.kinematics().frames[joint]
         across = np.asarray(axis) / np.linalg.norm(axis) if np.any(axis) else np.zeros(3)
         if not np.linalg.norm(np.cross(across, frame.axis_B)) > 0.02:
@@ -87,9 +87,9 @@ class SdfRobot:
             self._add_stage(joint, xyz, (-play / 2, play / 2))
 
     def set_stop(self, joint: str, lower: float, upper: float) -> None:
-        """The servo's joint ends at these angles, or where it ended before if that is nearer."""
+        """Sets the ends of the servo's joint, unless its present ends are nearer."""
         axis = self._joint(joint).find("axis")
-        assert axis is not None  # a revolute joint without one is no joint that Drake reads
+        assert axis is not None  # Drake does not read a revolute joint without one
         limit = axis.find("limit")
         limit = SubElement(axis, "limit") if limit is None else limit
         lower, upper = max(lower, float(limit.findtext("lower", "-inf"))), min(upper, float(limit.findtext("upper", "inf")))
@@ -101,7 +101,7 @@ class SdfRobot:
         self._built.append((joint, lower, upper))
 
     def add_parallel_spring(self, joint: str, stiffness: float) -> None:
-        """A spring [N m/rad] across the servo's joint, at rest in neutral, beside one that the file may give it."""
+        """A spring [N m/rad] across the servo's joint, relaxed in neutral, in addition to any spring in the file."""
         axis = self._joint(joint).find("axis")
         assert axis is not None
         dynamics = axis.find("dynamics")
@@ -125,8 +125,8 @@ class SdfRobot:
         write_inertia(inertial, m, center + offset, inertia)
 
     def lengthen(self, link: str, change: float) -> None:
-        """The way from the link's joint to the next longer by `change`: what hangs on it moves along; of a last link, its foot
-        does. The next of several is their mean. The link's inertia stays."""
+        """Lengthens the link by `change`, from its joint to the next (to the mean of several): the links that it carries move
+        along, or the foot if it carries none. The link's inertia is unchanged."""
         k = self.kinematics()
         way = self.way(k, link)
         length = float(np.linalg.norm(way))
@@ -142,26 +142,26 @@ class SdfRobot:
         self._built.append((link, change))
 
     def way(self, k: Kinematics, link: str) -> Array:
-        """From a link's joint to the next, of several to their mean, of a last link to its foot: (3,) [m], in its frame.
-        k: of this robot."""
+        """Vector (3,) [m] from a link's joint to the next (to the mean of several, or to the foot of a last link), in the link's
+        frame. k: kinematics of this robot."""
         joint = k.parent_joint[link]
         if joint is None:
-            raise InputError(self.source, f"length of '{link}': the root link has no joint; expected a link that hangs on one")
+            raise InputError(self.source, f"length of '{link}': the root link has no joint; expected a link with a parent joint")
         carrier = k.frames[joint]
         following, foot = self._ends(k, link)
         ends = [f.X_PF_p for f in following] or [numbers(s.find("pose"), 6)[:3] for s in foot if s.tag == "collision"]
         if not ends:
-            raise InputError(self.source, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
+            raise InputError(self.source, f"length of '{link}': expected a joint or a collision shape at its end")
         return np.asarray(np.mean(ends, axis=0) - carrier.p_BM, dtype=float)
 
     def _ends(self, k: Kinematics, link: str) -> tuple[list[JointFrame], list[Element]]:
-        """Joints that hang on a link; of one that carries none, its foot's shapes."""
+        """Joints that a link carries; if it carries none, the shapes of its foot."""
         following = [f for f in k.frames.values() if f.parent == link]
         return following, [] if following else self._foot(link)
 
     def _place_links(self, k: Kinematics, carried: set[str], link: str, shift: Array) -> None:
-        """Writes where each link stands, from the root, and each joint, from its child, so that nothing moves but by intent:
-        `carried` links and what hangs on them, by `shift` (3,) in `link`'s frame."""
+        """Writes the pose of each link relative to the root, and of each joint relative to its child, so that only the `carried`
+        links and their descendants move, by `shift` (3,) in `link`'s frame."""
         poses = k.forward(np.zeros((1, len(k.joints))))
         for name in k.links:
             if name == k.root:
@@ -174,13 +174,13 @@ class SdfRobot:
             write_pose(self._joint(name), f.p_BM, f.X_MB_R.T)
 
     def _foot(self, link: str) -> list[Element]:
-        """Shapes of the link's foot: those named so, or all that touch."""
+        """Shapes of the link's foot: those with "foot" in their names, or else all collision shapes."""
         shapes = [s for s in self._link(link) if s.tag in ("collision", "visual")]
         named = [s for s in shapes if "foot" in s.get("name", "")]
         return named if any(s.tag == "collision" for s in named) else [s for s in shapes if s.tag == "collision"]
 
     def _add_stage(self, joint: str, xyz: Element | None, limits: tuple[float, float] | None, stiffness: float = 0.0) -> None:
-        """Puts a light link before the joint's link, and between the two a joint without an actuator."""
+        """Inserts a light link before the joint's link, and a joint without an actuator between the two."""
         before, link = self.stages.get(joint, ()), self._carried_by(joint)
         name = f"{joint}_stage_{len(before) + 1}"
         gear = SubElement(self._model, "link", {"name": f"{name}_gear"})
@@ -209,7 +209,7 @@ class SdfRobot:
         self._built.append((name, None if xyz is None else ElementTree.tostring(xyz), limits))
 
     def _keep_apart(self, joint: str) -> None:
-        """Neighbours do not collide in Drake; with a gear between them they would."""
+        """Excludes collisions of the two links: Drake excludes only neighbours, and these now have a gear between them."""
         group = SubElement(self._model, f"{DRAKE}collision_filter_group", {"name": f"{joint}_neighbours"})
         for link in (self._joint(joint).findtext("parent", "").strip(), self._carried_by(joint)):
             SubElement(group, f"{DRAKE}member").text = link
@@ -225,7 +225,7 @@ class SdfRobot:
         return self._find("joint", name)
 
     def _carried_by(self, joint: str) -> str:
-        """The link that the joint has in the file, whatever was put between since."""
+        """The joint's child link in the file, without inserted stages."""
         self._joint(joint)
         return self._link_of[joint]
 
@@ -233,16 +233,17 @@ class SdfRobot:
         return self._find("link", name)
 
     def inertial(self, link: str) -> Element:
-        """The <inertial> of a link; InputError where it has none."""
+        """The <inertial> of a link; InputError if it has none."""
         inertial = self._link(link).find("inertial")
         if inertial is None:
-            raise InputError(self.source, f"link '{link}' has no <inertial>, to which mass could be added")
+            raise InputError(self.source, f"link '{link}' has no <inertial> to which mass can be added")
         return inertial
 
 
 @lru_cache(maxsize=8)
 def _parse(path: Path, changed: int) -> Element:
-    """The root of a file, which has to be copied; changed: when the file was, so that it is read again."""
+    """The root element of a file; callers must copy it. changed: the file's time of modification, so that a changed file is read
+    again."""
     return ElementTree.parse(path).getroot()
 
 

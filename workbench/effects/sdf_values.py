@@ -13,18 +13,18 @@ _MOMENTS = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (
 
 
 def format_numbers(values: Array) -> str:
-    """Numbers as an SDF holds them, exact."""
+    """Numbers as SDF text, exact."""
     return " ".join(repr(float(v)) for v in np.ravel(values))
 
 
 def numbers(element: Element | None, count: int) -> Array:
-    """The numbers that an element holds; `count` zeros without it or in an empty one."""
+    """The numbers in an element; `count` zeros if it is missing or empty."""
     found = (element.text or "").split() if element is not None else []
     return np.array([float(v) for v in found]) if found else np.zeros(count)
 
 
 def set_child(element: Element, tag: str, value: float | str) -> None:
-    """Text of the element's only child of that tag, made if it is missing."""
+    """Sets the text of the element's only child with this tag, which is created if it is missing."""
     child = element.find(tag)
     child = SubElement(element, tag) if child is None else child
     child.text = value if isinstance(value, str) else repr(value)
@@ -60,7 +60,7 @@ def read_inertia(inertial: Element) -> tuple[float, Array, Array]:
 
 
 def write_inertia(inertial: Element, mass: float, center: Array, inertia: Array) -> None:
-    """As `read_inertia` reads it."""
+    """Writes mass, centre and inertia in the form that `read_inertia` returns."""
     write_pose(inertial, center, np.eye(3))
     set_child(inertial, "mass", float(mass))
     moments = inertial.find("inertia")

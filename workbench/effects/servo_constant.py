@@ -18,7 +18,7 @@ from workbench.servo import ServoLaw
 
 
 class ServoConstant(Effect):
-    """The first parameter is added to a field of `ServoLaw`, multiplies it, or is the most that it may be."""
+    """The first parameter is added to a field of `ServoLaw`, multiplies it, or limits it from above."""
 
     layer = "actuator"
     places = ("joint",)
@@ -26,7 +26,7 @@ class ServoConstant(Effect):
     how: ClassVar[Literal["add", "multiply", "at most"]] = "add"
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
-        """The constant changed at its joints alone."""
+        """Changes the constant at the effect's joints only."""
         constant, by = getattr(law, self.field).copy(), values[self.parameters[0].name]
         before = constant[columns]
         constant[columns] = {"add": before + by, "multiply": before * by, "at most": np.minimum(before, by)}[self.how]
@@ -34,7 +34,7 @@ class ServoConstant(Effect):
 
 
 def any_proportional(model: RobotModel) -> bool:
-    """Whether a servo of the robot follows goals by a position gain, as servos with firmware for that do."""
+    """Whether a servo of the robot has a proportional position gain."""
     return any(model.servo(j).proportional_gain is not None for j in model.joints)
 
 
@@ -51,5 +51,5 @@ def any_register(model: RobotModel, name: str) -> bool:
 def _registers(family: str) -> Sequence[str]:
     try:
         return tuple(servo_profile(family).registers)
-    except InputError:  # nobody's family
+    except InputError:  # no known family
         return ()

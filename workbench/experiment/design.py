@@ -20,7 +20,15 @@ from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, long_runs
 from workbench.experiment.options import EXPERIMENT
-from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, project, reshown, show
+from workbench.experiment.projection import (
+    ObservationModel,
+    PairChannels,
+    channels,
+    fit_to_each_other,
+    project,
+    project_pair,
+    with_channels,
+)
 from workbench.experiment.rivals import Pair
 from workbench.experiment.runs import Runs, spans
 from workbench.experiment.segment import Segment
@@ -64,10 +72,12 @@ class Experiment:
     separations: tuple[Separation, ...]
 
     def entry(self, file: str = "next_experiment.csv") -> NextExperiment | None:
-        """For findings.json; None where nothing would be separated."""
-        told = [s for s in self.separations if s.separated]
-        return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
-                              ) if told else None
+        """The experiment's entry in findings.json; None where nothing would be separated. file: name of the motion's file."""
+        separated = [s for s in self.separations if s.separated]
+        if not separated:
+            return None
+        ratios = tuple(s.log_likelihood_ratio for s in separated)
+        return NextExperiment(file, self.base, tuple(s.effects for s in separated), ratios)
 
 
 def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]],
@@ -111,7 +121,7 @@ def _trunk(model: RobotModel) -> list[str]:
 
 
 def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
-    """The joints that a pair speaks of: its own; the joint that carries its link; else thighs and knees, or all of them."""
+    """The joints that a pair concerns: its own; the joint that carries its link; else thighs and knees, or all of them."""
     k = model.kinematics
     named = [w if w in model.joints else k.parent_joint.get(w) for e in pair.effects for w in e.where]
     joints = tuple(dict.fromkeys(j for j in named if j in model.joints))
@@ -121,7 +131,7 @@ def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
 
 
 class _Bench:
-    """Tries pieces on one base, puts them together and proves the whole."""
+    """Designs the experiment on one base: tries segments, combines them, and verifies the whole motion."""
 
     def __init__(self, nominal: RobotModel, base: Base, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.nominal, self.base, self.sight, self.progress = nominal, base, sight, progress
@@ -129,14 +139,14 @@ class _Bench:
         self.runs = Runs(self.reach, base, sight, n_jobs, progress)
 
     def design(self, pairs: Sequence[Pair]) -> Experiment:
-        """The best motion."""
+        """The best motion for these pairs; a rest of a second where no segment separates any."""
         pieces: dict[str, Segment] = {}
-        tried: list[dict[str, Shown]] = []
+        tried: list[dict[str, PairChannels]] = []
         for i, pair in enumerate(pairs):
             library = self._library(pair)
             pieces |= {s.name: s for s in library}
             tried.append(self._try_pieces(pair, library, f"trying motions, {i + 1} of {len(pairs)}"))
-        chosen = [pieces[name] for name in _chosen(pieces, tried)]
+        chosen = [pieces[name] for name in _choose_segments(pieces, tried)]
         if not chosen:
             still = Segment("rest", self.base, np.array([0.0, 1.0]), np.zeros((2, len(self.nominal.joints))))
             return Experiment(self.runs.motion([still]), self.base, tuple(Separation(p.names, "", 0.0, 0.0) for p in pairs))
@@ -151,10 +161,11 @@ class _Bench:
         lasting = any(not e.where for e in pair.effects)
         return pieces + (long_runs(self.nominal, self.reach, focus, EXPERIMENT.longest) if lasting else [])
 
-    def _try_pieces(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, Shown]:
-        """What pieces show of a pair, by name: both on all of them, their neighbours on those where they differ most."""
+    def _try_pieces(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, PairChannels]:
+        """The channels of a pair on each segment, by its name: of both rivals on all segments, of their neighbours on those where
+        the two differ most."""
         takes = self.runs.play_all(pair.models, [[s] for s in library], what)
-        rough = {s.name: (s, of, show(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
+        rough = {s.name: (s, of, project_pair(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
         best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:EXPERIMENT.kept]
         if not best:
             return {}
@@ -163,10 +174,10 @@ class _Bench:
         finer: list[Take | None] = [None for _ in kept]
         if self.base == "free":  # a robot on its feet multiplies small errors; one on a stand hardly does
             finer = [fine for fine, in self.runs.play_all(pair.models[:1], kept, what, EXPERIMENT.time_step / 2)]
-        return {s.name: show(pair, [*of, *more], self.sight, fine)
+        return {s.name: project_pair(pair, [*of, *more], self.sight, fine)
                 for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}
 
-    def _verify(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, Shown]) -> Separation:
+    def _verify(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, PairChannels]) -> Separation:
         """Residual difference of two rivals on the whole motion, each fitted to the other by rollouts."""
         named = [s.name for s in chosen if s.name in tried]
         if not named:
@@ -174,24 +185,24 @@ class _Bench:
         frames = np.concatenate([np.r_[span] for name, span in spans(chosen, self.sight.rate).items() if name in named])
 
         def play(models: Sequence[RobotModel]) -> list[Array]:
-            said = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
-            return [project(take, self.sight)[frames].ravel() for take in self.runs.play_all(models, [chosen], said)[0]]
+            stage = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
+            return [project(take, self.sight)[frames].ravel() for take in self.runs.play_all(models, [chosen], stage)[0]]
 
-        known = Shown.join([tried[name] for name in named])
+        known = PairChannels.join([tried[name] for name in named])
         a, b = play(pair.models)
-        known = reshown(reshown(known, a, "a"), b, "b")
-        nearest = min(fitted_to_each_other(pair, known, play), key=lambda c: c.cost)
+        known = with_channels(with_channels(known, a, "a"), b, "b")
+        nearest = min(fit_to_each_other(pair, known, play), key=lambda c: c.cost)
         rms = known.rms(nearest.left)
         where = channels(self.sight, self.base)[int(np.argmax(rms))]
         return Separation(pair.names, where, float(rms.max()), nearest.cost / 2)
 
 
-def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]]) -> list[str]:
+def _choose_segments(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, PairChannels]]) -> list[str]:
     """Chooses the segments to play, in order; tried: how well each separates each pair."""
 
     def value(names: Sequence[str]) -> float:
         shows = [[of[name] for name in names if name in of] for of in tried]
-        return sum(math.log1p(Shown.join(s).chi_squared() / 2) for s in shows if s)
+        return sum(math.log1p(PairChannels.join(s).chi_squared() / 2) for s in shows if s)
 
     def fits(names: Sequence[str]) -> bool:
         alone = any(pieces[name].long for name in names)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
@@ -17,7 +16,7 @@ from workbench.motion import Motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import units_of
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 class Reach:
@@ -62,7 +61,7 @@ class Reach:
                 return smaller
         return None
 
-    def clear(self, q: Array, share: float = 1.0) -> NDArray[np.bool_]:
+    def clear(self, q: Array, share: float = 1.0) -> Mask:
         """Whether in poses (N, n) [rad] links that do not touch in neutral keep this share of their distance (N,)."""
         k = self.model.kinematics
         poses = k.forward(q, self.model.joints)

@@ -60,7 +60,7 @@ class JointMoves:
         self.others = _neighbours(model, self.focus) if len(self.focus) == 1 else ()
 
     def segments(self) -> list[Segment]:
-        """All of them, made smaller where links would come too near each other; those that stay too near are left out."""
+        """All moves, made smaller where links would come too near each other; those that stay too near are left out."""
         named = (replace(s, name=f"{' '.join(self.focus)}: {s.name}") for s in self._all())
         return [s for s in map(self.reach.scaled_clear, named) if s is not None]
 
@@ -94,9 +94,9 @@ class JointMoves:
     def _steps(self, name: str, posture: Mapping[str, float], sizes: Sequence[float]) -> Segment:
         path = self._path()
         if posture:
-            path.to(posture, EXPERIMENT.quick).hold(0.2)
+            path.to(posture, EXPERIMENT.quick).hold(EXPERIMENT.pause)
         for size in sizes:
-            path.to(self._offset(size, posture)).hold(0.2)
+            path.to(self._offset(size, posture)).hold(EXPERIMENT.pause)
         return path.home().segment(f"quick steps, {name}")
 
     def _tremble(self) -> Segment:
@@ -104,24 +104,24 @@ class JointMoves:
         for size, beat, times in ((4, 0.06, 6), (8, 0.09, 6), (15, 0.14, 4)):
             for k in range(2 * times):
                 path.to(self._offset(size * (-1) ** k, {}), least=beat)
-        return path.home().segment("trembling")
+        return path.home().segment("small oscillation")
 
     def _approach(self, name: str, posture: Mapping[str, float]) -> Segment:
-        """The same angle reached from both sides, by long and by short ways."""
+        """Moves that reach the same angle from both sides, from near and from far."""
         path = self._path().to(posture, EXPERIMENT.quick).hold(0.25)
         for size in (15, 0, -15, 0, 5, 0, -5, 0):
             path.to(self._offset(size, posture), EXPERIMENT.slow).hold(0.15)
         return path.home().segment(f"both ways, {name}")
 
     def _stairs(self, name: str, posture: Mapping[str, float]) -> Segment:
-        path = self._path().to(posture, EXPERIMENT.quick).hold(0.2)
+        path = self._path().to(posture, EXPERIMENT.quick).hold(EXPERIMENT.pause)
         for size in (1.5, 3, 4.5, 6, 4.5, 3, 1.5, 0, -1.5, -3, -1.5, 0):
             path.to(self._offset(size, posture)).hold(0.12)
         return path.home().segment(f"stairs, {name}")
 
     def _shaken(self, name: str, posture: Mapping[str, float]) -> Segment:
         """The joint holds while its neighbours jerk."""
-        path = self._path().to(posture, EXPERIMENT.quick).hold(0.2)
+        path = self._path().to(posture, EXPERIMENT.quick).hold(EXPERIMENT.pause)
         for share in (1, -1, 1, -1, 0.4, -0.4, 0.4, 0):
             shaken = {j: self.reach.within(j, posture.get(j, 0.0) + share * math.radians(18)) for j in self.others[:1]}
             path.to(shaken).hold(0.15)
@@ -135,10 +135,10 @@ class JointMoves:
         best = max(np.unique(q[:, column]), key=lambda a: np.ptp(torque[q[:, column] == a]))
         here = np.flatnonzero(q[:, column] == best)
         up, down = (self._pose(q[here[k]]) for k in (np.argmax(torque[here]), np.argmin(torque[here])))
-        path = self._path().to(up, EXPERIMENT.quick).hold(0.2)
+        path = self._path().to(up, EXPERIMENT.quick).hold(EXPERIMENT.pause)
         for pose, speed in ((down, EXPERIMENT.slow), (up, EXPERIMENT.quick), (down, EXPERIMENT.quick)):
-            path.to(pose, speed).hold(0.2)
-        return path.home().segment("load turned round")
+            path.to(pose, speed).hold(EXPERIMENT.pause)
+        return path.home().segment("load reversed")
 
     def _postures(self) -> dict[str, dict[str, float]]:
         """Postures in which gravity pulls the joint one way and the other as hard as may be; neutral for several joints."""
@@ -172,7 +172,7 @@ def long_runs(model: RobotModel, reach: Reach, focus: Sequence[str], seconds: fl
     while path.times[-1] < seconds - 1.5:
         size = math.radians(next(sizes))
         path.to({j: reach.within(j, size) for j in focus}).hold(0.12)
-    work = path.home().segment("long work", long=True)
+    work = path.home().segment("sustained load", long=True)
     path = Path(model.joints, reach.speeds)
     while path.times[-1] < seconds - 3.5:
         for k in range(18):  # many short poses on a slow zigzag, then few long ones on another

@@ -60,6 +60,8 @@ class ExperimentOptions:
     """Speed of sweeps [rad/s]."""
     quick: float = math.radians(150)
     """Speed from one posture to another [rad/s]."""
+    pause: float = 0.2
+    """Rest in each posture [s], in which the joints settle."""
     rest_at_end: float = 0.3
     """Rest at a segment's end, after which the next one finds the robot as if it had stood in neutral [s]."""
     grid: tuple[float, ...] = (-60.0, -30.0, 0.0, 30.0, 60.0)

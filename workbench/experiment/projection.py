@@ -1,4 +1,4 @@
-"""What takes of two rivals show, and how near each could come to the other by moving its own numbers."""
+"""Channels of two rivals' takes, and how closely each rival imitates the other by adapting its own parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Imitator = Literal["a", "b"]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class PairChannels:
     """The channels of a pair's takes, over sigma, flattened, with frames whose errors are correlated weighted to count as one.
 
     a, b (m,): of each rival. of_a, of_b (m, p): sensitivities of each to its own parameters; nuisance (m, k): to the unknowns of
@@ -42,16 +42,17 @@ class Shown:
     counts: Array
 
     @staticmethod
-    def join(parts: Sequence[Shown]) -> Shown:
-        """Of takes that follow each other."""
-        return Shown(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(Shown)))
+    def join(parts: Sequence[PairChannels]) -> PairChannels:
+        """The channels of takes that follow each other."""
+        return PairChannels(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(PairChannels)))
 
     def chi_squared(self) -> float:
         """Cost of the better imitator: of the residual, and of moving far from the session's estimate."""
         return min(self.closest("a").cost, self.closest("b").cost)
 
     def closest(self, imitator: Imitator, x: Array | None = None, moving: bool = True) -> Closest:
-        """How near one comes to the other, now at x (p,), by moving its numbers (unless not `moving`) and all that is open."""
+        """How closely one rival imitates the other from parameters x (p,), by adapting them (if `moving`) and the unknowns of the
+        recording."""
         S = self.of_a if imitator == "a" else self.of_b
         D = self.b - self.a if imitator == "a" else self.a - self.b
         x = np.zeros(S.shape[1]) if x is None else x
@@ -79,7 +80,7 @@ class Closest:
 
 
 def channels(sight: ObservationModel, base: str) -> tuple[str, ...]:
-    """Seen: the joints that have a sigma, and on the ground the body, where cameras see it."""
+    """Names of the observed channels: the joints that have a sigma, and on a free base the body's, where cameras see it."""
     return (*sight.sigma, *(BODY if base == "free" and sight.captured else ()))
 
 
@@ -92,8 +93,9 @@ def project(take: Take, sight: ObservationModel) -> Array:
     return np.asarray(np.nan_to_num(q[~take.resting]))
 
 
-def show(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> Shown:
-    """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
+def project_pair(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> PairChannels:
+    """The channels of a pair in takes of its models and of their neighbours, in that order. finer: the first rival's with the
+    step halved, whose difference counts as error."""
     a, b, *others = (project(t, sight) for t in takes)
     floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(project(finer, sight) - a), axis=0))
     n, c = a.shape
@@ -102,11 +104,12 @@ def show(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take
     weight = counts / np.sqrt(1 + floor**2)
     of_a = [(o - a) / s for o, s in zip(others[:p], pair.a.steps())]
     of_b = [(o - b) / s for o, s in zip(others[p:], pair.b.steps())]
-    return Shown((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n),
-                 _flat(left_open(a, sight), weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
+    unknowns = _flat(recording_unknowns(a, sight), weight, n)
+    return PairChannels((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n), unknowns,
+                        np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
 
 
-def left_open(y: Array, sight: ObservationModel) -> list[Array]:
+def recording_unknowns(y: Array, sight: ObservationModel) -> list[Array]:
     """Unknowns of a recording, as changes of the channels (N, c) over sigma, each (N, c) by one standard deviation: the time of
     the first command, and the angle at which each joint was zeroed."""
     if not sight.captured:
@@ -119,8 +122,8 @@ def left_open(y: Array, sight: ObservationModel) -> list[Array]:
     return out
 
 
-def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
-    """The same where the imitator shows y (m,), over sigma."""
+def with_channels(known: PairChannels, y: Array, imitator: Imitator) -> PairChannels:
+    """The pair with other channels y (m,), over sigma, of the imitator."""
     return replace(known, a=known.weight * y) if imitator == "a" else replace(known, b=known.weight * y)
 
 
@@ -138,22 +141,23 @@ def _flat(columns: Sequence[Array], weight: Array, frames: int) -> Array:
     return np.stack([(weight * c).ravel() for c in columns], axis=1)
 
 
-def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
-    """How near each rival comes to the other: Gauss-Newton with the sensitivities that are known, both at once.
+def fit_to_each_other(pair: Pair, known: PairChannels, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
+    """How closely each rival imitates the other: Gauss-Newton with the sensitivities that are known, both at once.
 
-    play: what models show over sigma, each (m,) as in `known`.
+    play: rolls models out; returns the channels of each, over sigma, (m,) as in `known`.
     """
     rivals: dict[Imitator, Rival] = {"a": pair.a, "b": pair.b}
     best = {i: (known, known.closest(i, moving=False)) for i in rivals}
     settled = {i for i, r in rivals.items() if not len(r.steps())}
     for _ in range(EXPERIMENT.rounds):
+        # the full step, and a shorter one in case the response is not linear
         trials = [(i, at.x + share * (here.closest(i, at.x).x - at.x))
                   for i, (here, at) in best.items() if i not in settled for share in (1.0, 0.4)]
         if not trials:
             break
-        ends: dict[Imitator, list[tuple[Shown, Closest]]] = {}
+        ends: dict[Imitator, list[tuple[PairChannels, Closest]]] = {}
         for (i, x), y in zip(trials, play([rivals[i].move(x).model for i, x in trials])):
-            now = reshown(known, y, i)
+            now = with_channels(known, y, i)
             ends.setdefault(i, []).append((now, now.closest(i, x, moving=False)))
         for i, options in ends.items():
             nearest = min(options, key=lambda o: o[1].cost)

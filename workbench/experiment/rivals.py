@@ -26,7 +26,7 @@ class Rival:
         return np.array([EXPERIMENT.freedom * n.felt for n in self._numbers()])
 
     def move(self, x: Array) -> Rival:
-        """With its numbers moved by x (p,), in units of `freedom`, as far as is possible."""
+        """The rival with its numbers moved by x (p,), in units of `freedom`, as far as is possible."""
         values = [float(np.clip(n.value + dx * f, n.low, n.high)) for n, dx, f in
                   zip(self._numbers(), x, self.freedom, strict=True)]
         effects = list(self.model.effects)
@@ -48,7 +48,7 @@ class Rival:
         )
 
     def neighbours(self) -> list[Rival]:
-        """With each number moved by its step, one at a time."""
+        """The rival with each number moved by its step, one at a time."""
         steps = self.steps()
         return [self.move(np.eye(len(steps))[i] * steps[i]) for i in range(len(steps))]
 
@@ -106,12 +106,12 @@ class Pair:
 
     @property
     def effects(self) -> tuple[EffectSpec, ...]:
-        """Those in which they differ."""
+        """The effects in which the two differ."""
         return tuple(r.model.effects[i] for r in (self.a, self.b) for i in r.own)
 
     @property
     def names(self) -> tuple[str, str]:
-        """Of the effect that each has and the other has not; several are joined by +, none is nominal."""
+        """Names of the effect that each has and the other has not; several are joined by +, none is nominal."""
         first, second = ("+".join(r.model.effects[i].effect for i in r.own) or "nominal" for r in (self.a, self.b))
         return first, second
 
@@ -122,5 +122,5 @@ class Pair:
 
     @property
     def neighbours(self) -> list[RobotModel]:
-        """Of the first, then of the second: for sensitivities."""
+        """The neighbours of the first, then of the second, from which sensitivities are computed."""
         return [r.model for r in (*self.a.neighbours(), *self.b.neighbours())]

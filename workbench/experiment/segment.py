@@ -25,12 +25,12 @@ class Segment:
 
     @property
     def duration(self) -> float:
-        """Of the segment [s]."""
+        """Length of the segment [s]."""
         return float(self.times[-1])
 
 
 def join(segments: Sequence[Segment]) -> Segment:
-    """One after the other."""
+    """Segments one after the other."""
     times, angles, at = [segments[0].times], [segments[0].angles], segments[0].duration
     for s in segments[1:]:
         times.append(s.times[1:] + at)

@@ -53,14 +53,14 @@ class BodyMoves:
                 continue
             for pose in poses:
                 assert pose is not None
-                path.to(pose, speed, least=0.12).hold(0.2)
+                path.to(pose, speed, least=0.12).hold(EXPERIMENT.pause)
             yield path.home(calm).segment(name, "free")
         k = self.model.kinematics
         carrying = {j for foot in self._legs for j in k.chain(self.model.foot_links[foot])}
         counterweights = [j for j in self.model.joints if j not in carrying]
         deep = self._pose(down)
         if counterweights and deep is not None:
-            path = Path(self.model.joints, self.reach.speeds).to(deep, calm).hold(0.2)
+            path = Path(self.model.joints, self.reach.speeds).to(deep, calm).hold(EXPERIMENT.pause)
             for share in (1, -1, 0.5):
                 path.to({j: self.reach.within(j, share * math.radians(40)) for j in counterweights}, brisk).hold(0.25)
             yield path.home(calm).segment("counterweights", "free")
@@ -103,7 +103,7 @@ class BodyMoves:
         return -1.0 if float(hip @ knee) > 0 else 1.0
 
     def _goal_error(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:
-        """From its goal to the foot (3,) [m]."""
+        """Vector from its goal to the foot (3,) [m]."""
         return self._foot(foot, joints, x) - goal
 
     def _foot(self, foot: str, joints: tuple[str, ...], x: Array) -> Array:
@@ -120,7 +120,7 @@ class BodyMoves:
 
     @cached_property
     def _length(self) -> float:
-        """Of a leg, from the joint of its thigh to its foot [m]."""
+        """Length of a leg, from the joint of its thigh to its foot [m]."""
         k = self.model.kinematics
         foot, joints = next(iter(self._legs.items()))
         hip = k.forward(np.zeros((1, 1)), joints[:1])[k.frames[joints[-2]].child][0][0]

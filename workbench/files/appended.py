@@ -13,16 +13,16 @@ from workbench.files.errors import InputError
 
 
 class AppendedFile:
-    """Appends to a new file; no file of that name may exist. left_over: what such a file would be, and what to do with it, for
-    the message. sync_every: most time that a power cut may cost [s]; without it only `close` waits for the disk."""
+    """Appends to a new file. if_it_exists: the message of the InputError where a file of that name exists: what it is, and what
+    to do with it. sync_every: longest stretch that a power cut may cost [s]; by default only `close` waits for the disk."""
 
-    def __init__(self, path: Path, left_over: str, sync_every: float = math.inf) -> None:
+    def __init__(self, path: Path, if_it_exists: str, sync_every: float = math.inf) -> None:
         self.path, self._sync_every, self._synced = path, sync_every, time.monotonic()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except FileExistsError:
-            raise InputError(path, left_over) from None
+            raise InputError(path, if_it_exists) from None
         except OSError as e:
             raise InputError(path, f"cannot be written ({e.strerror})") from None
 

@@ -57,6 +57,14 @@ def regular_file(path: str | Path, most: int | None = None) -> Path:
     return path
 
 
+def read_bytes(path: str | Path, most: int | None = None) -> bytes:
+    """The content of a file of at most `most` bytes; InputError where it cannot be read."""
+    try:
+        return regular_file(path, most).read_bytes()
+    except OSError as e:
+        raise InputError(path, f"cannot be read ({e.strerror})") from None
+
+
 def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
     """The text of a UTF-8 file of at most `most` bytes, with or without byte order mark; InputError where it cannot be read."""
     try:
@@ -73,7 +81,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def parse_json(path: str | Path, text: str, place: str = "") -> Any:
-    """As `read_json`, for a text at `place` in the file."""
+    """The same as `read_json`, for a text at `place` in the file."""
     try:
         return json.loads(text, parse_int=_bounded_int, parse_float=_finite_float, parse_constant=_finite_float)
     except json.JSONDecodeError as e:

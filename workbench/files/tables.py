@@ -19,22 +19,22 @@ def plain_table(content: bytes) -> tuple[bytes, str]:
     UTF-16 with its mark becomes UTF-8; lone CR become line ends; `;` or tabs between the cells of the first line become commas,
     and commas in numbers points.
     """
-    said = []
+    changes = []
     encoding = _UTF16.get(content[:2])
     if encoding:
         content = content[2:].decode(encoding, "replace").encode("utf-8", "replace")
-        said.append("UTF-16")
+        changes.append("UTF-16")
     head = content[:HEAD]
     if b"\r" in head and b"\n" not in head:
         content = content.replace(b"\r", b"\n")
-        said.append("lines that end in CR")
+        changes.append("lines that end in CR")
     first = next((line for line in content[:HEAD].split(b"\n") if line.strip() and not line.startswith(b"#")), b"")
     for cell, name in ((b";", "';'"), (b"\t", "tabs")):
         if first.count(cell) > first.count(b",") and first.count(cell) >= _cells_least(first, cell):
             content = content.replace(b",", b".").replace(cell, b",")
-            said.append(f"{name} between cells")
+            changes.append(f"{name} between cells")
             break
-    return content, ", ".join(said)
+    return content, ", ".join(changes)
 
 
 def _cells_least(first: bytes, cell: bytes) -> int:

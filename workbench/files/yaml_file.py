@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,7 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
+_Dumper.add_multi_representer(str, yaml.SafeDumper.represent_str)  # problems are text with a kind
 _Dumper.yaml_implicit_resolvers = {
     first: [*yaml.SafeDumper.yaml_implicit_resolvers.get(first, []), *_CoreLoader.yaml_implicit_resolvers.get(first, [])]
     for first in {*yaml.SafeDumper.yaml_implicit_resolvers, *_CoreLoader.yaml_implicit_resolvers}}
@@ -134,6 +135,10 @@ class Fields:
     def error(self, key: str, expected: str) -> InputError:
         """The error to raise about `key`."""
         return InputError(self.path, f"{self.at(key)}: {expected}")
+
+    def missing(self, keys: Sequence[str]) -> InputError:
+        """The error to raise about required keys that are absent."""
+        return self.error(", ".join(keys), "is missing" if len(keys) == 1 else "are missing")
 
     def at(self, key: str) -> str:
         """Place of a key in the file."""
@@ -203,12 +208,20 @@ class Fields:
         return None if value is None else Fields(self.path, value, self.at(key))
 
     def items(self) -> Iterator[tuple[str, Any]]:
-        """All keys that are left, with their values, for mappings whose keys are names."""
+        """Takes all keys that are left, with their values, for mappings whose keys are names."""
         while self._left:
             key = next(iter(self._left))
             if not isinstance(key, str):
                 raise self.error(str(key), "expected a name as key")
             yield key, self.raw(key)
+
+    def numbered(self) -> dict[int, Any]:
+        """Takes all keys that are left, with their values, for mappings whose keys are whole numbers of at least 0."""
+        for key in self._left:
+            if isinstance(key, bool) or not isinstance(key, int) or key < 0:
+                raise self.error(str(key), "expected a whole number as key")
+        out, self._left = self._left, {}
+        return out
 
     def sequence(self, key: str) -> list[Fields]:
         """A list of mappings; empty where the key is absent."""
@@ -262,10 +275,10 @@ def top_of(path: Path, *keys: str) -> Fields:
         raise InputError(path, "top level: expected a mapping, as in a session.yaml or a model.yaml "
                                "(`workbench inspect` recognises other files)")
     top = Fields(path, content)
-    said = top.raw("format")
-    if said is None:
+    version = top.raw("format")
+    if version is None:
         top.only("format", *keys)
-    if said != 1:
+    if version != 1:
         raise top.error("format", "expected 1")
     top.only(*keys)
     return top

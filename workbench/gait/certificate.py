@@ -72,7 +72,7 @@ class Certificate:
         return json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n"
 
     def summary(self) -> str:
-        """In a few lines, for a person."""
+        """The certificate in a few lines, for a person."""
         n, d = self.nominal, self.draws
         turns = n.unit == "rad/s"
         unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)
@@ -84,7 +84,7 @@ class Certificate:
             falls = f"{d['falls']} fell (probability of a fall below {100 * d['falls at most']:.2g} % at 95 % confidence)"
             lines = [f"{self.request}: {low} {unit} of {d['count']} sampled robots, {nominal}",
                      f"{falls}; heading drift {d['heading deg/m RMS']:.2g} deg/m RMS"]
-            lines += _straightened(d.get("straightened"))
+            lines += _describe_straightening(d.get("straightened"))
             lines += [f"sample {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
         lines.append(f"binding limit: {worst}")
@@ -101,7 +101,7 @@ class Certificate:
         return "\n".join(lines)
 
 
-def _straightened(found: Mapping[str, Any] | None) -> list[str]:
+def _describe_straightening(found: Mapping[str, Any] | None) -> list[str]:
     """Residual heading after the recordings, in a line; empty where it was not examined."""
     if not found or found["after one metre deg/m RMS"] is None:
         return []
@@ -175,8 +175,8 @@ def hashes(**tables: PoseTable) -> dict[str, str]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    said = json.dumps(plain({k: v for k, v in content.items() if k != "sha256"}), sort_keys=True)
-    return hashlib.sha256(said.encode()).hexdigest()
+    text = json.dumps(plain({k: v for k, v in content.items() if k != "sha256"}), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def plain(value: Any) -> Any:

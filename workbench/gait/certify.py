@@ -1,11 +1,11 @@
-"""Everything that a certificate says, found out by simulation."""
+"""Simulates everything that a certificate states."""
 
 from __future__ import annotations
 
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -34,13 +34,13 @@ from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel
 from workbench.types import Progress
 
-__all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
+__all__ = ["Certified", "CertifyOptions", "OtherEngine", "certify"]
 
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """A simulation, in words, and the function that runs it."""
 
 TOGETHER = 4
-"""Draws that go to a process at once."""
+"""Robots that a process simulates in one call: each call sends it the table and options anew."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,10 @@ class Certified:
 
 def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel], options: CertifyOptions,
             progress: Progress, provenance: dict[str, Any], other: tuple[str, OtherEngine] | None = None) -> Certified:
-    """Examines a table on the request's robot. draws: robots of the ensemble, fresh ones, not those of the search."""
+    """Simulates a table on the request's robot, and states which limits it keeps.
+
+    draws: robots of the ensemble that the search has not seen. provenance: entries for the certificate, to which the time taken
+    is added [s]. other: name of a second engine, and the engine. """
     began = time.monotonic()
     examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
     robots = [request.on_slope(d) for d in draws[:options.draws]]
@@ -64,28 +67,31 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     straightener = _straightener(machine, request, table, probed) if robots and options.trimmed else None
     trimmed = _groups(robots[:min(options.trimmed, len(robots) - len(probed))]) if straightener is not None else []
     variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
-    work: list[Work] = [("nominal robot", examiner.nominal, ())]
-    work += [(f"numerics, {v}", examiner.variant, (v,)) for v in variants]
     conditioned = () if other is None else conditions()
-    work += [] if other is None else [(f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned]
-    work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
-    work += [("back to its cycle", examiner.limit_cycle, (vendor_table(machine.model),))] if options.watched else []
-    work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
-    work += [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener]
-    results = _all(work, options.n_jobs, progress)
-    run: NominalRun = next(results)
+    results = _run({
+        "nominal": [("nominal robot", examiner.nominal, ())],
+        "variants": [(f"numerics, {v}", examiner.variant, (v,)) for v in variants],
+        "elsewhere": [] if other is None else [
+            (f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned],
+        "in Drake": [(f"robot {k + 1} of {len(robots)} in Drake", examiner.compare_engines, (r,))
+                     for k, r in enumerate(robots[:options.checked])],
+        "cycle": [("back to its cycle", examiner.limit_cycle, (vendor_table(machine.model),))] if options.watched else [],
+        "robots": [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)],
+        "straightened": [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener],
+    }, options.n_jobs, progress)
+    run: NominalRun = results["nominal"][0]
     nominal = run.measure
-    floor = _floor(request, dict(zip(variants, _take(results, len(variants)))))
-    pairs = {c.name: next(results) for c in conditioned}
-    checks = _take(results, len(robots[:options.checked]))
-    cycle: LimitCycle | None = next(results) if options.watched else None
-    robots_drawn = [d for group in _take(results, len(groups)) for d in group]
-    walks = [w for group in results for w in group]
-    told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
+    floor = _floor(request, dict(zip(variants, results["variants"])))
+    pairs = {c.name: pair for c, pair in zip(conditioned, results["elsewhere"])}
+    checks = results["in Drake"]
+    cycle: LimitCycle | None = results["cycle"][0] if options.watched else None
+    robots_drawn = [d for group in results["robots"] for d in group]
+    walks = [w for group in results["straightened"] for w in group]
+    draw_results, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if straightener is not None:
-        told["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
+        draw_results["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
     if checks:
-        told["the same in Drake"] = _checked(request, checks, options)
+        draw_results["the same in Drake"] = _compare_with_drake(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
                *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
                *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
@@ -97,14 +103,14 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
         asked=request.to_plain(), tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
-        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=told, floor=floor,
+        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=draw_results, floor=floor,
         other_engine=elsewhere, ways=run.ways, cycle=_cycle(cycle, run.measure, on_draws), shape=asdict(table.shape),
         provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
     return Certified(certificate, run.take, run.cycles, request)
 
 
 def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:
-    """By TOGETHER."""
+    """Robots in groups of TOGETHER, each for one process."""
     return [robots[k:k + TOGETHER] for k in range(0, len(robots), TOGETHER)]
 
 
@@ -118,39 +124,39 @@ def _straightener(machine: GaitMachine, request: Request, table: GaitTable, prob
     return Straightener(machine.model, request, table.shape, response, request.limits.spread)
 
 
-def _take(results: Iterator[Any], count: int) -> list[Any]:
-    """The next `count` of them."""
-    return [next(results) for _ in range(count)]
-
-
-def _all(work: Sequence[Work], n_jobs: int, progress: Progress) -> Iterator[Any]:
-    """Results in their order, each as soon as it and those before it are there."""
+def _run(work: Mapping[str, Sequence[Work]], n_jobs: int, progress: Progress) -> dict[str, list[Any]]:
+    """Runs groups of simulations in `n_jobs` processes; returns each group's results, in its order."""
+    queue = [(group, *item) for group, items in work.items() for item in items]
+    out: dict[str, list[Any]] = {group: [] for group in work}
     with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
-        results = iter(Parallel(n_jobs=n_jobs, return_as="generator", batch_size=1)(delayed(f)(*args) for _, f, args in work))
-        for k, (what, _, _) in enumerate(work):
-            progress(f"certifying: {what}", k / len(work))
-            yield next(results)
+        results = iter(Parallel(n_jobs=n_jobs, return_as="generator", batch_size=1)(delayed(f)(*args) for *_, f, args in queue))
+        for k, (group, what, *_) in enumerate(queue):
+            progress(f"certifying: {what}", k / len(queue))
+            out[group].append(next(results))
+    return out
 
 
-def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]], options: CertifyOptions) -> dict[str, Any]:
+def _compare_with_drake(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]], options: CertifyOptions
+                        ) -> dict[str, Any]:
+    """The certificate's entry on robots that both the compiled station and Drake played: how far their speeds are apart."""
     apart = np.array([request.progress(b) - request.progress(a) for a, b in checks])
     return {"count": len(checks), "seconds": options.checked_seconds, "step s": options.checked_step,
             "speed apart, RMS": float(np.sqrt((apart**2).mean()))}
 
 
 def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> Steadiness:
-    """How the gait repeats, from cycle to cycle, and from where it comes back to that."""
+    """How evenly the gait repeats from cycle to cycle, and from which disturbances it returns to that."""
     walked = [math.degrees(m.scatter[1]) for m in draws if not m.fell and math.isfinite(m.scatter[1])]
-    told = Steadiness(nominal.scatter[0], math.degrees(nominal.scatter[1]), float(np.median(walked)) if walked else None)
+    steadiness = Steadiness(nominal.scatter[0], math.degrees(nominal.scatter[1]), float(np.median(walked)) if walked else None)
     if cycle is None:
-        return told
-    return replace(told, watched=cycle.watched, back={r.entry: r.cycles for r in cycle.returns},
+        return steadiness
+    return replace(steadiness, watched=cycle.watched, back={r.entry: r.cycles for r in cycle.returns},
                    fell=tuple(r.entry for r in cycle.returns if r.fell))
 
 
 def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]:
-    """What steps and contact models move."""
+    """Speed and drift under other time steps and contact models, and how far they spread."""
     speeds = {k: request.progress(m) for k, m in measures.items()}
     drifts = {k: math.degrees(drift(request, m)) for k, m in measures.items()}
     steps = [v for k, v in speeds.items() if k.endswith("ms")] or [0.0]

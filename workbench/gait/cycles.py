@@ -13,7 +13,8 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Scatter:
-    """From one cycle to the next of a settled gait, standard deviations: speed along the way it goes [m/s], and heading [rad]."""
+    """How a settled gait varies from one cycle to the next, as standard deviations: speed along the way it goes [m/s], and
+    heading [rad]."""
 
     speed: float
     heading: float
@@ -37,7 +38,7 @@ def cycles_of(take: Take, begin: float, period: float, end: float = math.inf) ->
 
 
 def scatter_of(cycles: Array) -> Scatter:
-    """Of cycles (N, 3) as `cycles_of` gives them; NaN of fewer than two."""
+    """The scatter of cycles (N, 3) as `cycles_of` gives them; NaN of fewer than two."""
     if len(cycles) < 2:
         return Scatter(math.nan, math.nan)
     way = cycles[:, :2].mean(axis=0)

@@ -24,6 +24,8 @@ CHANCE = 0.3
 """Largest probability with which a screening may refuse a gait that nine of ten robots keep."""
 OVER_DRAWS = " over draws"
 """Ends the name of a limit that is judged on draws."""
+CONFIDENCE = 0.95
+"""Of the bound on the share of robots that fall."""
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 FEWEST = 20
 """Draws from which a 5th percentile says more than the smallest value: of fewer, less than one robot is below it."""
@@ -86,11 +88,11 @@ def foot_speed(machine: GaitMachine, request: Request, m: GaitMeasure) -> float:
     return abs(m.turn_rate) * machine.arm
 
 
-def bound(events: int, count: int, confidence: float = 0.95) -> float:
-    """Largest probability of an event that this many in `count` trials leave open at the confidence (Clopper and Pearson)."""
+def bound(events: int, count: int) -> float:
+    """Largest probability of an event that `events` in `count` trials leave open at CONFIDENCE (Clopper and Pearson)."""
     from scipy.stats import beta
 
-    return 1.0 if count <= events else float(beta.ppf(confidence, events + 1, count - events))
+    return 1.0 if count <= events else float(beta.ppf(CONFIDENCE, events + 1, count - events))
 
 
 def _required_count(count: int) -> int:
@@ -128,25 +130,26 @@ class Drawn:
     incident: str = ""
 
 
-def drawn(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
-    """Of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake played it."""
-    said = ""
+def record_draw(model: RobotModel, measure: GaitMeasure, feet: FeetMeasure, gave_up: bool) -> Drawn:
+    """The record of a run. gave_up: whether the compiled station did, because something other than a foot touched, and Drake
+    played it."""
+    incident = ""
     if measure.fell:
-        said = f"fell: tilt {math.degrees(measure.tilt):.0f} deg"
+        incident = f"fell: tilt {math.degrees(measure.tilt):.0f} deg"
     elif gave_up:
         went = f"{float(np.hypot(*measure.velocity)):.2f} m/s, tilt {math.degrees(measure.tilt):.0f} deg"
-        said = f"something other than a foot touched; it went on at {went}"
+        incident = f"something other than a foot touched; it went on at {went}"
     kept = replace(measure, clearance=feet.clearance, slip=feet.slip, touched=gave_up and not measure.fell)
-    return Drawn(described(model), kept, feet, said)
+    return Drawn(describe_robot(model), kept, feet, incident)
 
 
-def described(model: RobotModel) -> str:
+def describe_robot(model: RobotModel) -> str:
     """What stands out of a drawn robot: its floor and its supply."""
     words = {"ground_friction": ("friction", "friction {:.2f}"), "supply_voltage": ("voltage", "{:.1f} V"),
              "supply_sag": ("drop", "{:.2f} V sag a servo")}
-    told = [(words[e.effect], e.parameters) for e in model.effects if e.effect in words and not e.where]
-    said = [form.format(parameters[name]) for (name, form), parameters in told]
-    return ", ".join(said) or "the nominal robot"
+    drawn_effects = [(words[e.effect], e.parameters) for e in model.effects if e.effect in words and not e.where]
+    words_of = [form.format(parameters[name]) for (name, form), parameters in drawn_effects]
+    return ", ".join(words_of) or "the nominal robot"
 
 
 def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
@@ -164,15 +167,15 @@ def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
         "tipping margin deg": [math.degrees(d.feet.tipping) for d in standing],
         "electrical power W": [d.measure.power for d in standing],
         "largest RMS torque N m": [max(d.measure.rms) for d in standing]}
-    told: dict[str, Any] = {k: _quantiles(np.array(v), len(robots)) for k, v in values.items()}
+    out: dict[str, Any] = {k: _quantiles(np.array(v), len(robots)) for k, v in values.items()}
     falls = sum(m.fell for m in measures)
-    told["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
-    told["worse half of speeds"] = worse_half(values[f"speed {request.unit}"])
+    out["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
+    out["worse half of speeds"] = worse_half(values[f"speed {request.unit}"])
     incidents = [{"draw": k + 1, "robot": d.robot, "what": d.incident} for k, d in enumerate(robots) if d.incident]
-    return told | {"count": len(robots), "falls": falls, "falls at most": bound(falls, len(robots)), "quantiles": list(QUANTILES),
-                   "incidents": incidents}
+    return out | {"count": len(robots), "falls": falls, "falls at most": bound(falls, len(robots)), "quantiles": list(QUANTILES),
+                  "incidents": incidents}
 
 
 def _quantiles(values: NDArray[np.float64], count: int) -> list[float | None]:
-    """At QUANTILES; None for those that so few draws do not give."""
+    """Values at QUANTILES; None for those that so few draws cannot determine."""
     return [float(np.quantile(values, q)) if count >= FEWEST or q in (0.0, 0.5, 1.0) else None for q in QUANTILES]

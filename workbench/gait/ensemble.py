@@ -71,12 +71,12 @@ class Ensemble:
 
     @property
     def sha256(self) -> str:
-        """Of everything that is drawn."""
-        said = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
+        """Digest of everything that the ensemble draws from."""
+        content = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
         if self.posterior is not None:
-            said += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),
-                     np.asarray(self.posterior.covariance).tolist()]
-        return hashlib.sha256(repr(said).encode()).hexdigest()
+            content += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),
+                        np.asarray(self.posterior.covariance).tolist()]
+        return hashlib.sha256(repr(content).encode()).hexdigest()
 
     def _draw(self, model: RobotModel, legs: list[str], rng: np.random.Generator, folder: Path,
               values: Mapping[str, float]) -> RobotModel:
@@ -100,7 +100,7 @@ class Ensemble:
             factors = {link: float(1 + self.mass_share * rng.uniform(-1, 1)) for link in model.kinematics.links}
             drawn = with_masses(drawn, factors, folder)
         known = {(e.effect, place) for e in model.effects for place in e.where or (EVERYWHERE,)}
-        return drawn.with_effects((*drawn.effects, *(e for e in effects if not _diagnosed(e, known))))
+        return drawn.with_effects((*drawn.effects, *(e for e in effects if not _is_diagnosed(e, known))))
 
 
 def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -> RobotModel:
@@ -149,7 +149,7 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
     return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
 
 
-def _diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
+def _is_diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
     """Whether a diagnosis found this effect at this place: there it is better known than the file's range, and nowhere else."""
     return (drawn.effect, EVERYWHERE) in known or any((drawn.effect, place) in known for place in drawn.where)
 

@@ -42,9 +42,9 @@ def table_sha256(*tables: PoseTable) -> str:
     """Parts of the firmware's table: joints, goals, speeds, dwells, and which poses are played once."""
     digest = hashlib.sha256()
     for t in tables:
-        said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
-                **({"start": t.start, "stop": t.stop} if t.start or t.stop else {})}
-        digest.update(json.dumps(said).encode())
+        content = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
+                   **({"start": t.start, "stop": t.stop} if t.start or t.stop else {})}
+        digest.update(json.dumps(content).encode())
     return digest.hexdigest()
 
 
@@ -61,7 +61,7 @@ class Candidate:
 
     @property
     def shape(self) -> GaitShape:
-        """In numbers."""
+        """The gait's shape in numbers."""
         return self.table.shape
 
     @cached_property
@@ -100,8 +100,8 @@ class Evaluator:
         self._tables: dict[GaitShape, tuple[GaitTable | None, list[Margin]]] = {}
         self.rollouts = 0
 
-    def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
-               ) -> list[Candidate]:
+    def judge(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
+              ) -> list[Candidate]:
         """The shapes as candidates, in their order. draws: number of the ensemble's robots on which the candidates selected by
         `keep` are tried (default: all that keep the limits so far on the nominal robot)."""
         new = [s for s in dict.fromkeys(shapes) if s not in self._tables]
@@ -112,14 +112,14 @@ class Evaluator:
         out = [self._candidate(t, margins, nominal.get(id(t))) for t, margins in tables]
         chosen = [c for c in (keep(out) if keep else out) if c.nominal is not None and not c.nominal.fell] if draws else []
         robots = self.draws[:draws]
-        told = self._measures([(c.table, robot) for robot in robots for c in chosen])
+        on_robots = self._measures([(c.table, robot) for robot in robots for c in chosen])
         for i, c in enumerate(chosen):
-            measures = tuple(told[i + k * len(chosen)] for k in range(len(robots)))
+            measures = tuple(on_robots[i + k * len(chosen)] for k in range(len(robots)))
             out[next(k for k, o in enumerate(out) if o is c)] = self._judge(c.table, [m for m in c.margins if _of_table(m)],
                                                                             c.nominal, measures)
         return out
 
-    def measured(self, runs: Sequence[tuple[GaitShape, RobotModel]]) -> list[GaitMeasure]:
+    def measure(self, runs: Sequence[tuple[GaitShape, RobotModel]]) -> list[GaitMeasure]:
         """Measures of each shape on a robot of its own, which is on the slope already. InputError where a goal is beyond the
         registers."""
         return self._measures([(gait_table(self.machine, shape), robot) for shape, robot in runs])
@@ -152,7 +152,7 @@ class Evaluator:
                       *speed_margins(request, nominal, draws), *draw_margins(self.machine, request, draws))
         return Candidate(table, everything, nominal, draws, cost_of(self.machine, request, nominal, draws))
 
-    def _measured(self, take: Take, model: RobotModel, begin: float, period: float) -> GaitMeasure:
+    def _measure(self, take: Take, model: RobotModel, begin: float, period: float) -> GaitMeasure:
         """Draws are asked for less: their current is the certificate's matter."""
         m = measure(take, model, begin, period, electrical=model is self.nominal)
         feet = feet_measure(take, model, self.machine.legs, begin, period)
@@ -175,7 +175,7 @@ class Evaluator:
         self.rollouts += len(jobs)
         for (key, (table, model)), take in zip(wanted.items(), self._rollouts.takes(jobs, as_seen)):
             begin, period = table.start_seconds + table.period, table.period
-            self._known[key] = fallen(len(model.joints)) if take is None else self._measured(take, model, begin, period)
+            self._known[key] = fallen(len(model.joints)) if take is None else self._measure(take, model, begin, period)
             lines.append(json.dumps([key, as_plain(self._known[key])]) + "\n")
         if self._memory is not None and lines:
             with self._memory.open("a") as f:

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from workbench.files import InputError
 from workbench.files.option_checks import check_choice, check_positive, check_whole
-from workbench.gait.draws import Drawn, drawn
+from workbench.gait.draws import Drawn, record_draw
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.limit_cycle import LimitCycle, limit_cycle
@@ -27,7 +26,7 @@ from workbench.motion import Commands, PoseTable, load_motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 OtherEngine = Callable[[RobotModel, Commands, float], Take]
 """Plays commands for so many seconds on a robot, in an engine that shares no simulation code with this one."""
@@ -114,7 +113,7 @@ class Examiner:
         rows = np.flatnonzero(take.time >= 0)[::max(1, round(SELF_CONTACT_EVERY / float(np.median(np.diff(take.time)))))]
         order = [take.joints.index(j) for j in self.model.joints]
         near = SelfContact(self.model).nearest(take.q[rows][:, order])
-        return NominalRun(take, *self._measured(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
+        return NominalRun(take, *self._measure(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
 
     def limit_cycle(self, other: PoseTable | None) -> LimitCycle:
         """The nominal robot again, entered and disturbed in other ways. other: another table, from which it comes."""
@@ -146,23 +145,23 @@ class Examiner:
         jobs, out = [self._job(r, config, seconds, SHORT_REST) for r in robots], []
         for robot, job, take in zip(robots, jobs, Rollouts(1).takes(jobs)):
             played = simulate_batch([replace(job, config=replace(config, engine="drake"))])[0] if take is None else take
-            out.append(drawn(robot, *self._measured(played, robot, seconds), gave_up=take is None))
+            out.append(record_draw(robot, *self._measure(played, robot, seconds), gave_up=take is None))
         return out
 
-    def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
-        """One of them by the compiled station and by Drake, at the same step."""
+    def compare_engines(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
+        """Measures of one robot by the compiled station and by Drake, at the same step."""
         o = self.options
         config = SimulationConfig(base="free", time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
         (take,) = Rollouts(1).takes([self._job(robot, config, o.checked_seconds)])
         (again,) = simulate_batch([self._job(robot, replace(config, engine="drake"), o.checked_seconds)])
-        ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot, o.checked_seconds)[0]
-        return ours, self._measured(again, robot, o.checked_seconds)[0]
+        ours = fallen(len(self.model.joints)) if take is None else self._measure(take, robot, o.checked_seconds)[0]
+        return ours, self._measure(again, robot, o.checked_seconds)[0]
 
     def variant(self, name: str) -> GaitMeasure:
         """The nominal robot, computed in another way: one of VARIANTS."""
         config = replace(SimulationConfig(base="free", contact_period=0.0, log_period=0.01), **VARIANTS[name])
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
-        return self._measured(take, self.model, self.options.floor_seconds)[0]
+        return self._measure(take, self.model, self.options.floor_seconds)[0]
 
     def elsewhere(self, engine: OtherEngine, condition: Condition) -> Pair:
         """The robot under a condition, by this engine and by another. A gait entered at once has as long as its start takes to
@@ -173,11 +172,12 @@ class Examiner:
         commands = at_once if condition.at_once else self.table.commands(cycles, whole=True)
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
         (ours,) = simulate_batch([Job(model, config, commands, until, LEAD, name="gait")])
-        a, b = (self._measured(take, model, seconds)[0] for take in (ours, engine(model, commands, until)))
+        a, b = (self._measure(take, model, seconds)[0] for take in (ours, engine(model, commands, until)))
         return a, b
 
-    def _measured(self, take: Take, model: RobotModel, seconds: float) -> Measured:
-        """As in the search, the heading settles in the first whole cycle; torque counts from power-on."""
+    def _measure(self, take: Take, model: RobotModel, seconds: float) -> Measured:
+        """The measures of a take, as the search takes them: the heading settles in the first whole cycle; torque counts from
+        power-on."""
         period, end = self.table.period, self._walked_until(seconds)
         begin = self.table.start_seconds + period
         feet = feet_measure(take, model, self.legs, begin, period, end)
@@ -209,13 +209,13 @@ def _tilt(take: Take) -> Array:
     return np.asarray(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
 
 
-def _lasting(take: Take, inside: NDArray[np.bool_]) -> float:
+def _lasting(take: Take, inside: Mask) -> float:
     """Largest joint torque that lasts 10 ms [N m]."""
     assert take.torque is not None
     every = float(np.median(np.diff(take.time)))
     return float(minimum_filter1d(np.abs(take.torque[inside]), max(1, round(0.01 / every)), axis=0).max())
 
 
-def _jerk(take: Take, inside: NDArray[np.bool_]) -> float:
+def _jerk(take: Take, inside: Mask) -> float:
     assert take.p_WB is not None
     return base_jerk(take.time[inside], take.p_WB[inside])

@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
 from workbench.recording import quaternions
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 TOUCHING = 1e-3
 """Height of a foot's lowest point [m], above that at rest, below which it carries load: there points of 1e4 N/m yield by 0.3 mm,
@@ -32,8 +31,8 @@ class FeetMeasure:
 
 def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float, end: float = math.inf,
                  ) -> FeetMeasure:
-    """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping over the whole take. Positions of
-    feet are from the model's kinematics; for a tilted foot its lowest point counts."""
+    """Measures of the feet in a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping over the whole
+    take. Positions of feet are from the model's kinematics; for a tilted foot its lowest point counts."""
     height, speed = _lowest(take, model, legs)  # speed (N-1, F), between rows
     inside = (take.time >= begin - 1e-9) & (take.time <= end + 1e-9)
     z = height - _floor(height, take.time < 0)
@@ -46,8 +45,8 @@ def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: fl
 
 
 def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array, Array]:
-    """Of each foot's lowest point: its height in W (N, F) [m], and the speed along the ground (N-1, F) [m/s] at which the point
-    of the link that touches there moves until the next row; a foot that rolls does not slip."""
+    """Height and speed of each foot's lowest point: its height in W (N, F) [m], and the speed along the ground (N-1, F) [m/s] at
+    which the point of the link that touches there moves until the next row; a foot that rolls does not slip."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     poses, R_WB = model.kinematics.forward(take.q, take.joints), quaternions.matrix(take.quat_WB)
@@ -67,8 +66,8 @@ def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array
     return height, speed
 
 
-def _floor(z: Array, resting: NDArray[np.bool_]) -> Array:
-    """Where each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
+def _floor(z: Array, resting: Mask) -> Array:
+    """Height at which each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
     return np.asarray(np.median(z[resting], axis=0) if resting.any() else z.min(axis=0))
 
 

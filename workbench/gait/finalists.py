@@ -13,7 +13,7 @@ from workbench.gait.limits import Margin, return_margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import FALLS
-from workbench.gait.search import Found, steered
+from workbench.gait.search import Found, steer
 from workbench.gait.space import space_of
 from workbench.gait.table import gait_table
 from workbench.robot import RobotModel
@@ -29,22 +29,22 @@ class Screening:
     gait that breaks a limit in one meets no more, where a few robots may break one by chance. certified: how many gaits may be
     certified at most, which takes as long as a small search. Fresh robots are neither the search's nor the certificate's."""
 
-    rounds: tuple[int, ...] = (8, 24)
+    rounds: tuple[int, ...] = (8, 24, 64)
     certified: int = 3
 
 
 def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Sequence[RobotModel], screening: Screening,
               options: CertifyOptions, memory: Path | None, n_jobs: int, progress: Progress) -> Iterator[Candidate]:
     """Gaits of a search that keep every limit as long and as finely as the certificate walks: trimmed on the nominal robot, which
-    then has to come back to its cycle from every entry, and in rounds on fresh robots. What breaks a limit comes, too, so that
-    it can be said which; its `good` is false."""
+    then has to come back to its cycle from every entry, and in rounds on fresh robots. Gaits that break a limit are yielded,
+    too, with `good` false, so that the limit can be named."""
     config, space = replace(SEARCH, time_step=options.step), space_of(machine, request)
     nominal = Evaluator(machine, request, (), memory, n_jobs, config, options.seconds)
     others = Evaluator(machine, request, fresh, memory, n_jobs, config, options.draw_seconds)
     candidates = [c for c in (found.best, *found.others) if c.nominal is not None]
     for k, candidate in enumerate(candidates):
         progress(f"finalist {k + 1} of {len(candidates)}: trimmed on the nominal robot", None)
-        (walked,) = steered(nominal, space, nominal.judged([candidate.shape], 0), TRIMMED)
+        (walked,) = steer(nominal, space, nominal.judge([candidate.shape], 0), TRIMMED)
         if walked.good and options.watched:
             progress(f"finalist {k + 1} of {len(candidates)}: back to its cycle", None)
             walked = replace(walked, margins=(*walked.margins, _way_back(machine, request, walked, options)))
@@ -52,19 +52,20 @@ def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Seque
             if not walked.good or not fresh:
                 break
             progress(f"finalist {k + 1} of {len(candidates)}: on {count} fresh robots", None)
-            (drawn,) = others.judged([walked.shape], count, list)
+            (drawn,) = others.judge([walked.shape], count, list)
             lenient = draw_margins(machine, request, drawn.draws, screen=True)
-            walked = _with_draws(walked, replace(drawn, margins=replaced(drawn.margins, lenient)))
+            walked = _with_draws(walked, replace(drawn, margins=replace_margins(drawn.margins, lenient)))
         yield walked
 
 
 def _way_back(machine: GaitMachine, request: Request, gait: Candidate, options: CertifyOptions) -> Margin:
-    """As the certificate has it, on the nominal robot: seconds, where fresh robots and the rest of a certificate take minutes."""
+    """The certificate's limit on the way back to the cycle, on the nominal robot. It takes seconds, where fresh robots and the
+    rest of a certificate take minutes."""
     examiner = Examiner(request.on_slope(machine.model), machine.legs, gait_table(machine, gait.shape), options)
     return return_margin(examiner.limit_cycle(vendor_table(machine.model)), request.limits)
 
 
-def replaced(margins: Sequence[Margin], others: Sequence[Margin]) -> tuple[Margin, ...]:
+def replace_margins(margins: Sequence[Margin], others: Sequence[Margin]) -> tuple[Margin, ...]:
     """Margins of which those with the names of others make way for them."""
     names = {m.name for m in others}
     return (*(m for m in margins if m.name not in names), *others)

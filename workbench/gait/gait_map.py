@@ -160,10 +160,10 @@ def build_map(model: RobotModel, ensemble: Ensemble, folder: Path, seed: int = 0
     o = search.options
     found = search.run([model, *ensemble.draws(model, o.robots, seed, folder)], seed, progress)
     progress("measuring", None)
-    cells = search.measured(found, ensemble.draws(model, o.measured, seed + 1, folder, even=True))
+    cells = search.measure(found, ensemble.draws(model, o.measured, seed + 1, folder, even=True))
     progress("fresh robots", None)
     fresh = ensemble.draws(model, o.fresh, seed + 2, folder, even=True)
-    return GaitMap(o, search.tried(cells, fresh), search.rollouts, model.sha256)
+    return GaitMap(o, search.try_on(cells, fresh), search.rollouts, model.sha256)
 
 
 class _Search:
@@ -188,16 +188,16 @@ class _Search:
         for k in range(o.generations):
             progress(f"generation {k + 1}, {len(archive)} of {o.cells**2} cells", k / o.generations)
             points = emitter.ask()
-            judged = self.judged([self.shape(x) for x in points], robots)
+            judged = self.judge([self.shape(x) for x in points], robots)
             inside = [(x, *j) for x, j in zip(points, judged) if j is not None]
             if inside:
                 archive.add(*(np.array(column) for column in zip(*inside)))
         return [self.shape(x) for x in archive.data("solution")]
 
-    def measured(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[Cell]:
-        """Of gaits whose motion on these robots is in the same cell, the one that differs least from robot to robot."""
+    def measure(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]) -> list[Cell]:
+        """The cells that these gaits fill: of gaits in the same cell, the one that differs least from robot to robot."""
         cells: dict[tuple[int, int], Cell] = {}
-        for shape, judged in zip(shapes, self.judged(shapes, robots)):
+        for shape, judged in zip(shapes, self.judge(shapes, robots)):
             if judged is not None:
                 objective, (speed, turning) = judged
                 cell = Cell(shape, speed, turning, -objective)
@@ -214,15 +214,15 @@ class _Search:
         return row, column
 
     def shape(self, x: Array) -> GaitShape:
-        """Of a point of the unit cube."""
+        """The shape at a point of the unit cube."""
         return self.space.shape(np.asarray(x, dtype=float), self.options.family, self.options.knees)
 
-    def judged(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]
-               ) -> list[tuple[float, tuple[float, float]] | None]:
-        """Of each shape the objective, and the median speed and turning of the robots; None where one falls, a limit is broken,
+    def judge(self, shapes: Sequence[GaitShape], robots: Sequence[RobotModel]
+              ) -> list[tuple[float, tuple[float, float]] | None]:
+        """The objective of each shape, and the median speed and turning of the robots; None where one falls, a limit is broken,
         or these are beyond the map's range."""
         o, out = self.options, list[tuple[float, tuple[float, float]] | None]()
-        for motions in self.played(self.tables(shapes), robots):
+        for motions in self.play(self.tables(shapes), robots):
             speed, turning = (math.nan, math.nan) if motions is None else np.median(motions, axis=0).tolist()
             if motions is None or not (0.0 <= speed <= o.speed and abs(turning) <= o.turning):
                 out.append(None)
@@ -232,7 +232,7 @@ class _Search:
         return out
 
     def tables(self, shapes: Sequence[GaitShape]) -> list[GaitTable | None]:
-        """None for shapes beyond the legs' reach, or whose tables break a limit."""
+        """The table of each shape; None for shapes beyond the legs' reach, or whose tables break a limit."""
         limits, out = GaitLimits(), list[GaitTable | None]()
         for paths in paths_of(self.machine, shapes):
             try:
@@ -243,7 +243,7 @@ class _Search:
             out.append(table if good else None)
         return out
 
-    def played(self, tables: Sequence[GaitTable | None], robots: Sequence[RobotModel]) -> list[Array | None]:
+    def play(self, tables: Sequence[GaitTable | None], robots: Sequence[RobotModel]) -> list[Array | None]:
         """Speed [m/s] and turning [rad/s] of each table on every robot (R, 2); None without a table, or where a robot falls: the
         robots after it do not play that table."""
         seen: list[list[tuple[float, float]] | None] = [None if t is None else [] for t in tables]
@@ -257,10 +257,10 @@ class _Search:
                 seen[k] = None if moved is None else [*before, moved]
         return [None if s is None else np.array(s) for s in seen]
 
-    def tried(self, found: Sequence[Cell], fresh: Sequence[RobotModel]) -> tuple[Cell, ...]:
+    def try_on(self, found: Sequence[Cell], fresh: Sequence[RobotModel]) -> tuple[Cell, ...]:
         """The cells with what fresh robots did."""
         o, out = self.options, []
-        for cell, motions in zip(found, self.played(self.tables([c.shape for c in found]), fresh)):
+        for cell, motions in zip(found, self.play(self.tables([c.shape for c in found]), fresh)):
             if motions is None:
                 out.append(cell)
                 continue

@@ -41,7 +41,7 @@ class Leg:
     radii: Array
 
     def place(self, q: Array) -> Array:
-        """Where the tip is in the base link's frame (N, 3) [m] for angles (N, k) [rad], other joints at zero."""
+        """Position of the tip in the base link's frame (N, 3) [m] for angles (N, k) [rad], other joints at zero."""
         return self._place(q)[0]
 
     def jacobian(self, q: Array) -> Array:
@@ -69,7 +69,7 @@ class Leg:
 
     @property
     def length(self) -> float:
-        """From the first joint down to the ground in neutral [m]."""
+        """Distance from the first joint down to the ground in neutral [m]."""
         return float(self.hip[2] - self.neutral[2])
 
     def _place(self, q: Array) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ class Leg:
 
     @cached_property
     def _origins(self) -> list[Array]:
-        """Where the joints are in the base link's frame in neutral (3,) [m]."""
+        """Positions of the joints in the base link's frame in neutral (3,) [m]."""
         poses = self.kinematics.forward(np.zeros((1, len(self.kinematics.joints))))
         frames = [self.kinematics.frames[j] for j in self.joints]
         return [np.asarray(poses[f.parent][0][0] + poses[f.parent][1][0] @ f.X_PF_p) for f in frames]

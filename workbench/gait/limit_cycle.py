@@ -82,10 +82,10 @@ def limit_cycle(model: RobotModel, table: GaitTable, watched: int, step: float =
     (first,) = run([neutral])
     own = cycles_of(first, neutral.begin, period)
     scatter = scatter_of(own[-SETTLED:])
-    entries = [*_entries(table, watched, other), _pushed(first, table, watched, model)]
-    told = [came_back(neutral.name, first, own, own)]
-    told += [came_back(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
-    return LimitCycle(scatter, tuple(told), watched)
+    entries = [*_entries(table, watched, other), _push(first, table, watched, model)]
+    returns = [came_back(neutral.name, first, own, own)]
+    returns += [came_back(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
+    return LimitCycle(scatter, tuple(returns), watched)
 
 
 def came_back(name: str, take: Take, cycles: Array, own: Array) -> Return:
@@ -103,7 +103,8 @@ def came_back(name: str, take: Take, cycles: Array, own: Array) -> Return:
 
 
 def _entries(table: GaitTable, watched: int, other: PoseTable | None) -> list[_Entry]:
-    """Into the loop at full speed from neutral, at three phases; with a pose that got lost; from another table."""
+    """The entries that are tried: into the loop at full speed from neutral, at three phases; with a pose that got lost; from
+    another table."""
     loop, period = table.cycle, table.period
     every = loop.commands(watched + 1)
     out = []
@@ -114,13 +115,13 @@ def _entries(table: GaitTable, watched: int, other: PoseTable | None) -> list[_E
         out.append(_Entry(name, _from(every, first), rest))
     walked = table.commands(3 + watched)
     lost = len(table.start) + 2 * len(loop) + len(loop) // 2
-    out.append(_Entry("a pose got lost", _without(walked, lost), table.start_seconds + 3 * period))
+    out.append(_Entry("a pose got lost", _drop_command(walked, lost), table.start_seconds + 3 * period))
     if other is not None:
         out.append(_Entry("from another table", _after(other.commands(2), loop.commands(watched)), other.commands(2).end))
     return out
 
 
-def _pushed(take: Take, table: GaitTable, watched: int, model: RobotModel) -> _Entry:
+def _push(take: Take, table: GaitTable, watched: int, model: RobotModel) -> _Entry:
     """The run from neutral, continued from a beginning of its loop, with an additional velocity to the left."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
@@ -149,12 +150,12 @@ def _spin(before: Array, after: Array) -> Array:
 
 
 def _from(c: Commands, first: int) -> Commands:
-    """From one of the commands on, which then is at time 0."""
+    """The commands from one of them on, which then is at time 0."""
     return Commands(c.times[first:] - c.times[first], c.joints, c.goals[first:], c.speeds[first:], c.enabled[first:],
                     c.end - float(c.times[first]), c.poses[first:])
 
 
-def _without(c: Commands, lost: int) -> Commands:
+def _drop_command(c: Commands, lost: int) -> Commands:
     """Without one of the commands."""
     kept = np.arange(len(c.times)) != lost
     return replace(c, times=c.times[kept], goals=c.goals[kept], speeds=c.speeds[kept], enabled=c.enabled[kept],
@@ -162,7 +163,7 @@ def _without(c: Commands, lost: int) -> Commands:
 
 
 def _after(before: Commands, c: Commands) -> Commands:
-    """One schedule, then another."""
+    """One schedule followed by another."""
     c = c.reordered(before.joints)
     goals, speeds, enabled, poses = (np.concatenate([getattr(before, f), getattr(c, f)])
                                      for f in ("goals", "speeds", "enabled", "poses"))

@@ -120,7 +120,7 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
 
 
 def contact_margin(near: Nearness, limits: GaitLimits) -> Margin:
-    """Of links against each other."""
+    """The margin of links against each other."""
     where = " and ".join(near.links) if near.links[0] else "robot"
     return least("self-contact", where, 1000 * near.distance, 1000 * limits.clearance, "mm of clearance", "table")
 
@@ -146,12 +146,12 @@ def clearance_margin(limits: GaitLimits, m: GaitMeasure) -> Margin:
 
 
 def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:
-    """Of the way into the gait from which it takes longest to walk as it does after its own start."""
+    """The margin of the entry from which it takes the robot longest to walk as it does after its own start."""
     slowest = cycle.slowest
     if slowest.cycles is None:
         use = max(2.0, cycle.watched / limits.back)
-        said = "cycles, fell" if slowest.fell else "cycles, not returned"
-        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), said, use)
+        unit = "cycles, fell" if slowest.fell else "cycles, not returned"
+        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), unit, use)
     return _of("way back to its cycle", slowest.entry, slowest.cycles, limits.back, "cycles")
 
 
@@ -180,7 +180,7 @@ def least(name: str, where: str, value: float, limit: float, unit: str, kind: Ki
 
 
 def _worst(margins: Sequence[Margin]) -> list[Margin]:
-    """One for each name and place: the one that leaves least."""
+    """The worst margin of each name and place."""
     worst: dict[tuple[str, str], Margin] = {}
     for m in margins:
         if (m.name, m.where) not in worst or m.use > worst[m.name, m.where].use:

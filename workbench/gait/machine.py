@@ -19,7 +19,7 @@ from workbench.robot import GRAVITY, RobotModel
 from workbench.robot.ranges import JointRange, joint_ranges
 from workbench.robot.servo_units import ServoUnits, units_of
 from workbench.servo import ServoLaw
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 CREEP = 0.3
 """Joint speed [rad/s] about which Coulomb friction changes sign in the inverse servo law, so that a pose at a turning point asks
@@ -64,12 +64,12 @@ class GaitMachine:
 
     @cached_property
     def inverse_dynamics(self) -> InverseDynamics:
-        """Of the robot on its feet."""
+        """Inverse dynamics of the robot on its feet."""
         return InverseDynamics(self.model)
 
     @property
     def leg_length(self) -> float:
-        """Of the shortest leg in neutral [m]."""
+        """Length of the shortest leg in neutral [m]."""
         return min(leg.length for leg in self.legs)
 
     @cached_property
@@ -99,13 +99,13 @@ class GaitMachine:
         reached = np.floor(self.law.line.reachable_speed / self.speed_unit).astype(np.int64)
         return np.minimum(reached, [u.fastest for u in self.units])
 
-    def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, Mask]:
         """Joint angles (N, n) [rad] that put the feet on the shape's path at phases (N,), joints outside legs at zero; how far
         each foot stays from it (N, F) [m]; and which feet should stand (N, F)."""
         return self.angles_of([(shape, phases, size)])[0]
 
     def angles_of(self, wanted: Sequence[tuple[GaitShape, Array, Array | float]]
-                  ) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+                  ) -> list[tuple[Array, Array, Mask]]:
         """`angles` of many shapes at once: the same, in a fraction of the time."""
         if not wanted:
             return []
@@ -121,7 +121,7 @@ class GaitMachine:
         ends = np.cumsum([len(path.p) for path in paths])
         return [(q[b - len(path.p):b], off[b - len(path.p):b], path.stance) for path, b in zip(paths, ends)]
 
-    def droop(self, shape: GaitShape, q: Array, stance: NDArray[np.bool_]) -> Array:
+    def droop(self, shape: GaitShape, q: Array, stance: Mask) -> Array:
         """Lead of the reference over the joints (P, n) [rad], such that the servos' duty gives the torque of the gait at its
         poses: the inverse of the servo law on inverse dynamics of the joints' periodic path q (P, n), at constant body
         velocity."""

@@ -75,14 +75,14 @@ class GaitMeasure:
 
 
 def fallen(joints: int) -> GaitMeasure:
-    """Of a run that was given up because the robot lay on the floor, or its links met."""
+    """The measure of a run that was given up because the robot lay on the floor, or its links met."""
     nothing = (0.0,) * joints
     return GaitMeasure(True, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, math.pi / 2, nothing, nothing, nothing, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True, end: float = math.inf,
             since: float | None = None) -> GaitMeasure:
-    """Of a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s].
+    """Measures a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s].
 
     end: of the last cycle [s], where something follows it. since: from when on peak and torque_use count [s], to the take's end;
     None: in those cycles alone. fell, tilt and peak_current are of the whole take.

@@ -25,9 +25,9 @@ from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.plan_compare import PlanComparison, compare_plan
-from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
+from workbench.gait.plan_method import Plans, choose_plan, plan_entry, plans_of
 from workbench.gait.planned import planned_seeds
-from workbench.gait.refine import RefineOptions, refined
+from workbench.gait.refine import RefineOptions, refine
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -112,12 +112,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = _Draws(ensemble, machine.model, options, Path(folder))
         began = time.monotonic()
-        evaluator = Evaluator(machine, sought(request), draws.searched(), memory, options.n_jobs)
+        evaluator = Evaluator(machine, sought(request), draws.searching(), memory, options.n_jobs)
         plans = Plans() if options.method == "search" else plans_of(evaluator, progress)
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
-        before, found = found, refined(evaluator, found, options.refine, progress)
+        before, found = found, refine(evaluator, found, options.refine, progress)
         plans = plans.with_refined(before, found)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed,
@@ -127,14 +127,14 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
-            said = {**provenance, "finalist": finalist, **told_of_plan(c, plans)}
-            return table, certify(machine, request, table, draws.certifying(), examined, progress, said, other)
+            origin = {**provenance, "finalist": finalist, **plan_entry(c, plans)}
+            return table, certify(machine, request, table, draws.certifying(), examined, progress, origin, other)
 
-        def finished(met: bool, said: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
+        def finish(met: bool, problem: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
             planned = plans.of(table.shape)
             comparison = (None if planned is None else
                           compare_plan(machine, planned, table, certified.take, certified.cycles))
-            return Optimized(request, met, said, table, certified, found, comparison)
+            return Optimized(request, met, problem, table, certified, found, comparison)
 
         refused: list[Candidate] = []
         certified: list[tuple[GaitTable, Certified]] = []
@@ -147,25 +147,25 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
                 continue
             certified.append(examine(walked, options.certify, k + 1))
             if certified[-1][1].certificate.kept:
-                return finished(True, "", *certified[-1], replace(found, best=walked))
+                return finish(True, "", *certified[-1], replace(found, best=walked))
             progress(f"finalist {k + 1} is not certified: {binding(certified[-1][1].certificate.margins)}", None)
             if len(certified) == options.screening.certified:
                 break
         if certified:
             table, best = min(certified, key=lambda c: violation(c[1].certificate.margins))
-            return finished(False, _unmet(request, best.certificate.margins, None), table, best, found)
+            return finish(False, _unmet(request, best.certificate.margins, None), table, best, found)
         binds = min(refused, key=Candidate.rank, default=found.best)
         nearest = _nearest(found, refused)
-        said = _unmet(request, binds.margins, nearest)
+        problem = _unmet(request, binds.margins, nearest)
         if nearest is None:
-            return Optimized(request, False, said, None, None, found)
-        return finished(False, said, *examine(nearest, _briefly(options.certify), 0), found)
+            return Optimized(request, False, problem, None, None, found)
+        return finish(False, problem, *examine(nearest, _briefly(options.certify), 0), found)
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
     """Result of a method; None where no plan led to a table."""
     if options.method == "plan":
-        return chosen(evaluator, plans, progress)
+        return choose_plan(evaluator, plans, progress)
     if options.planned:
         progress("planning seeds", 0.0)
     planned = planned_seeds(evaluator.machine, evaluator.request) if options.planned else ()
@@ -181,17 +181,17 @@ class _Draws:
     options: OptimizeOptions
     folder: Path
 
-    def searched(self) -> list[RobotModel]:
-        """Those of the search, floor and supply spread evenly."""
+    def searching(self) -> list[RobotModel]:
+        """Robots for the search, floor and supply spread evenly."""
         return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder, even=True)
 
     def screening(self) -> list[RobotModel]:
-        """Those of the finalists."""
+        """Robots for the finalists."""
         count = max(self.options.screening.rounds, default=0)
         return self.ensemble.draws(self.model, count, SCREENED + self.options.seed, self.folder)
 
     def certifying(self) -> list[RobotModel]:
-        """Those of the certificate."""
+        """Robots for the certificate."""
         return self.ensemble.draws(self.model, self.options.certify.draws, 2 * self.options.seed + 1, self.folder)
 
 
@@ -217,18 +217,18 @@ def sought(request: Request) -> Request:
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
              progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
-    """Of a speed that no gait has: the nearest table, after a first look for the fastest. On a slope on which nothing stands, or
-    with servos that may not even hold it up, there is none."""
-    said = f"cannot be met by any gait: {impossible}"
+    """The answer to a speed that no gait has: the nearest table, after a first search for the fastest. On a slope on which
+    nothing stands, or with servos that may not even hold it up, there is none."""
+    problem = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
-        return Optimized(request, False, said, None, None, None)
-    progress(f"{said}; looking for the nearest that works", None)  # before the search, which takes half a minute
+        return Optimized(request, False, problem, None, None, None)
+    progress(f"{problem}; looking for the nearest that works", None)  # before the search, which takes half a minute
     look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
                    certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
-        said += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
-    return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
+        problem += f"; the nearest table in a quick search reaches {_speed(request, nearest.found.best)}"
+    return Optimized(request, False, problem, nearest.table, nearest.certified, nearest.found)
 
 
 def walk_speed(model: RobotModel) -> float:
@@ -262,17 +262,17 @@ def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Pat
 
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
     """One line: the binding limit, its excess, and the achievable value."""
-    said = f"{request}: not met"
+    problem = f"{request}: not met"
     limit = binding(_without_speed(margins))
     if limit is not None:
-        said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
+        problem += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if nearest is not None:
-        said += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
-    return said
+        problem += f"; the nearest table that keeps every limit reaches {_speed(request, nearest)}"
+    return problem
 
 
 def _without_speed(margins: Sequence[Margin]) -> list[Margin]:
-    """Of a gait that is too slow: what keeps it from being faster, if something else is at its limit."""
+    """The margins that keep a gait from being faster, where any is at its limit."""
     tight = [m for m in margins if m.kind != "speed" and m.use > 0.97 and not m.advice]
     return tight or list(margins)
 

@@ -58,7 +58,7 @@ def compare_plan(machine: GaitMachine, planned: Planned, table: GaitTable, take:
     average, so that a slower robot shows as an error that grows within the cycle and not from cycle to cycle."""
     K = len(planned.q)
     ours = _planned_motion(machine, planned)
-    every = [_simulated(machine, planned, take, table.start_seconds + c * table.period, table.period, K, ours)
+    every = [_simulated_cycle(machine, planned, take, table.start_seconds + c * table.period, table.period, K, ours)
              for c in range(1, cycles)]
     mean = {name: np.mean([getattr(m, name) for m in every], axis=0) for name in ("p", "R", "q", "feet")}
     theirs = Motion(mean["p"], mean["R"], mean["q"], mean["feet"],
@@ -75,7 +75,7 @@ def compare_plan(machine: GaitMachine, planned: Planned, table: GaitTable, take:
 
 
 def _rms(x: Array) -> float:
-    """Of vectors (N, 3)."""
+    """RMS length of vectors (N, 3)."""
     return float(np.sqrt((x**2).sum(axis=1).mean()))
 
 
@@ -107,7 +107,8 @@ def _tip(leg: Leg, q: Array, joints: tuple[str, ...]) -> Array:
     return leg.place(q[:, [joints.index(j) for j in leg.joints]])
 
 
-def _simulated(machine: GaitMachine, planned: Planned, take: Take, begin: float, period: float, K: int, ours: Motion) -> Motion:
+def _simulated_cycle(machine: GaitMachine, planned: Planned, take: Take, begin: float, period: float, K: int, ours: Motion
+                     ) -> Motion:
     """One cycle of a take, from the frame that goes as planned."""
     assert take.p_WB is not None
     assert take.quat_WB is not None

@@ -9,10 +9,11 @@ import numpy as np
 
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.planned import table_shape, tasks_of
-from workbench.gait.search import Found, Progress, keeps_all_but_speed, steered
+from workbench.gait.search import Found, keeps_all_but_speed, steer
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import space_of
 from workbench.gait.trajopt import Planned, plan
+from workbench.types import Progress
 
 Offsets = tuple[tuple[float, ...], ...]
 
@@ -27,7 +28,7 @@ class Plans:
     asked: int = 0
 
     def with_refined(self, before: Found, after: Found) -> Plans:
-        """With the programme behind the best gait of a search also behind those that were refined from it."""
+        """The plans, in which gaits refined from the best one of a search belong to its programme."""
         planned, known = self.of(before.best.shape), {before.best.shape, *(c.shape for c in before.others)}
         new = [c.shape.offsets for c in (after.best, *after.others) if c.shape not in known]
         return self if planned is None else replace(self, solved={**self.solved, **dict.fromkeys(new, planned)})
@@ -49,15 +50,15 @@ def plans_of(evaluator: Evaluator, progress: Progress) -> Plans:
     return Plans(solved, tuple(shapes), len(tasks))
 
 
-def chosen(evaluator: Evaluator, plans: Plans, progress: Progress) -> Found | None:
+def choose_plan(evaluator: Evaluator, plans: Plans, progress: Progress) -> Found | None:
     """The plans' tables on the nominal robot and on all of the evaluator's others, the best first; None where none was solved, or
     none has a table."""
     if not plans.shapes:
         return None
     progress(f"{len(plans.shapes)} planned tables on {1 + len(evaluator.draws)} robots", None)
     space = space_of(evaluator.machine, evaluator.request)
-    walked = steered(evaluator, space, evaluator.judged(plans.shapes, 0))
-    tried = evaluator.judged([c.shape for c in walked], len(evaluator.draws), list) if evaluator.draws else walked
+    walked = steer(evaluator, space, evaluator.judge(plans.shapes, 0))
+    tried = evaluator.judge([c.shape for c in walked], len(evaluator.draws), list) if evaluator.draws else walked
     ranked = sorted((c for c in tried if c.nominal is not None), key=Candidate.rank)
     if not ranked:
         return None
@@ -66,7 +67,7 @@ def chosen(evaluator: Evaluator, plans: Plans, progress: Progress) -> Found | No
     return Found(ranked[0], nearest, 0, evaluator.rollouts, tuple(ranked[1:]))
 
 
-def told_of_plan(c: Candidate, plans: Plans) -> dict[str, object]:
+def plan_entry(c: Candidate, plans: Plans) -> dict[str, object]:
     """The certificate's entry for the programme behind a gait: its task, planned speed [m/s, for a turn in place rad/s], and the
     share of it that the nominal robot reaches; empty for a gait that was not planned."""
     planned = plans.of(c.shape)

@@ -15,10 +15,11 @@ from workbench.gait.limits import clearance_margin, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.requirements import SLOWEST, drift
-from workbench.gait.search import Found, Progress
+from workbench.gait.search import Found
 from workbench.gait.shape import FAMILIES, GaitShape
 from workbench.gait.table import paths_of
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ class RefineOptions:
         check_positive(self, "probe", "target", "speed", "heading", "limit", "headroom")
 
 
-def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
+def refine(evaluator: Evaluator, found: Found, options: RefineOptions, progress: Progress) -> Found:
     """The search's result with its best gait refined, by the whole change or a part of it, where that is better on all of the
     evaluator's robots. Gaits that are better come first, the gait before them next. Only gaits that go straight and aim at speed
     are refined: their mirror symmetry halves the unknowns."""
@@ -80,7 +81,7 @@ def refined(evaluator: Evaluator, found: Found, options: RefineOptions, progress
     if shape == best.shape:
         return found
     progress("the refined gait on the ensemble", None)
-    tried = evaluator.judged([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
+    tried = evaluator.judge([_between(best.shape, shape, part) for part in options.parts], len(evaluator.draws), list)
     better = sorted((c for c in tried if c.nominal is not None and c.rank() < best.rank()), key=Candidate.rank)
     first, *others = [*better[:KEPT], best]
     return replace(found, best=first, others=(*others, *found.others), rollouts=evaluator.rollouts)
@@ -131,9 +132,9 @@ class Goal:
 
     @staticmethod
     def of(evaluator: Evaluator, shape: GaitShape, options: RefineOptions) -> Goal:
-        """At a shape, from its runs on all of the evaluator's robots."""
+        """The goal at a shape, from its runs on all of the evaluator's robots."""
         request, few = evaluator.request, options.robots
-        nominal, *draws = evaluator.measured([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
+        nominal, *draws = evaluator.measure([(shape, robot) for robot in (evaluator.nominal, *evaluator.draws)])
         order = sorted(range(len(draws)), key=lambda k: request.progress(draws[k]))
         order = [k for k in order if not draws[k].fell] + [k for k in order if draws[k].fell]
         uses = [_largest(_uses(evaluator, draws[k], False)) for k in order if not draws[k].fell]
@@ -146,14 +147,14 @@ class Goal:
                      max(request.progress(nominal), SLOWEST), limits)
 
     def residuals(self, shapes: Sequence[GaitShape]) -> list[Array]:
-        """Of each shape (R,)."""
-        measures = self.evaluator.measured([(s, robot) for s in shapes for robot in self.robots])
+        """Residuals of each shape (R,)."""
+        measures = self.evaluator.measure([(s, robot) for s in shapes for robot in self.robots])
         n = len(self.robots)
         return [np.concatenate([self._of(m, nominal=i == 0) for i, m in enumerate(measures[k:k + n])])
                 for k in range(0, len(measures), n)]
 
     def _of(self, m: GaitMeasure, nominal: bool) -> Array:
-        """Of one robot: of speed and heading, then one for each limit and place."""
+        """Residuals of one robot: speed and heading, then one for each limit and place."""
         o, request = self.options, self.evaluator.request
         uses = _uses(self.evaluator, m, nominal)
         if m.fell:
@@ -184,7 +185,7 @@ def _uses(evaluator: Evaluator, m: GaitMeasure, nominal: bool) -> dict[tuple[str
 
 
 def _largest(uses: Mapping[tuple[str, str], float]) -> dict[str, float]:
-    """Of each name over its places."""
+    """The largest of each name over its places."""
     out: dict[str, float] = {}
     for (name, _), use in uses.items():
         out[name] = max(use, out.get(name, 0.0))
@@ -209,7 +210,7 @@ class _Basis:
 
     @staticmethod
     def of(machine: GaitMachine, shape: GaitShape, harmonics: int) -> _Basis:
-        """Of a gait that goes straight."""
+        """The directions of a gait that goes straight."""
         phases = 2 * np.pi * np.arange(shape.poses) / shape.poses
         waves = [np.ones(shape.poses), *(f(k * phases) for k in range(1, harmonics + 1) for f in (np.cos, np.sin))]
         (even,) = paths_of(machine, [replace(shape, offsets=(), turn=0.0, side=0.0)])
@@ -219,7 +220,7 @@ class _Basis:
         return _Basis(shape, offsets, _pairs(machine, even.q, shift), np.stack(waves, axis=1), shift)
 
     def shape(self, x: Array) -> GaitShape:
-        """With the changes x (size,) [rad]."""
+        """The shape with the changes x (size,) [rad]."""
         out = self.offsets.copy()
         for (left, right, sign), numbers in zip(self.pairs, x.reshape(len(self.pairs), -1)):
             change = self.waves @ numbers

@@ -33,16 +33,16 @@ class Rollouts:
             yield from simulate_batch(jobs, self.n_jobs)
             return
         if self.n_jobs > 1 and len(jobs) > 1 and on_cluster():
-            yield from in_blocks(partial(_played, as_seen), jobs, self.n_jobs)
+            yield from in_blocks(partial(_play_block, as_seen), jobs, self.n_jobs)
             return
-        prepared = [self._prepared(job) for job in jobs]
+        prepared = [self._prepare(job) for job in jobs]
         if self.n_jobs == 1:
             yield from (_take(job, as_seen) for job in prepared)
             return
         with ThreadPoolExecutor(self.n_jobs) as threads:
             yield from threads.map(lambda job: _take(job, as_seen), prepared)
 
-    def _prepared(self, job: Job) -> CompiledJob | None:
+    def _prepare(self, job: Job) -> CompiledJob | None:
         key = f"{job.model.sha256} {job.config!r}"
         try:
             if key not in self._robots:
@@ -59,7 +59,7 @@ _of_this_process = Rollouts(1)
 """A worker's own, so that it settles each robot once however many blocks it gets."""
 
 
-def _played(as_seen: bool, jobs: Sequence[Job]) -> list[Take | None]:
+def _play_block(as_seen: bool, jobs: Sequence[Job]) -> list[Take | None]:
     """A block of jobs, in a worker."""
     return list(_of_this_process.takes(jobs, as_seen))
 

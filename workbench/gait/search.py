@@ -88,7 +88,7 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
     shapes = [*given, *(seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed) if budget.seeds else ())]
     if not shapes:
         raise InputError(None, "seeds: expected 1 or more, or a gait to start from, got 0")
-    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seeded(shapes))]
+    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seed_points(shapes))]
     for k in range(budget.generations):
         together = k < IN_TURN * len(runs)
         refiner = runs[k % len(runs)] if together else min(runs, key=lambda r: r.best.rank())
@@ -111,13 +111,13 @@ class _Run:
         self._streak = 0
         self._seen: list[Candidate] = []
 
-    def seeded(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
+    def seed_points(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
         """Starting points: the best on the ensemble of the best seeds, each of another family or another way of the
         knees."""
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
             self.progress(f"seeds {k} of {len(shapes)}", 0.0)
-            judged += steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
+            judged += steer(self.evaluator, self.space, self.evaluator.judge(shapes[k:k + 40], 0))
         screened: list[Candidate] = []
         kinds = Counter[tuple[str, tuple[int, int]]]()
         for c in sorted(judged, key=Candidate.rank):
@@ -125,7 +125,7 @@ class _Run:
             if kinds[_kind(c)] <= ALIKE and len(screened) < self.budget.screened:
                 screened.append(c)
         self.progress(f"{len(screened)} gaits on {self.draws} robots of the ensemble", None)
-        tried = self.tried(screened)
+        tried = self.try_on_draws(screened)
         self._note(tried)
         out: list[Candidate] = []
         for c in sorted(tried, key=Candidate.rank):
@@ -133,9 +133,10 @@ class _Run:
                 out.append(c)
         return out[:self.budget.starts]
 
-    def tried(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Each on the robots of the ensemble, those apart that do not even walk on the nominal one."""
-        return self.evaluator.judged([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
+    def try_on_draws(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Tries candidates on the robots of the ensemble; those that do not even walk on the nominal one are returned as they
+        are."""
+        return self.evaluator.judge([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
 
     def note_generation(self, candidates: Sequence[Candidate]) -> None:
         """After a generation: keeps the best, reports it."""
@@ -171,9 +172,9 @@ class _Run:
         return request.speed is not None and request.aim == "speed" and self._streak >= self.budget.enough
 
     def _note(self, candidates: Sequence[Candidate]) -> None:
-        told = [c for c in candidates if len(c.draws) >= self.draws]
-        self._seen += told
-        for c in told or candidates:
+        judged_on_draws = [c for c in candidates if len(c.draws) >= self.draws]
+        self._seen += judged_on_draws
+        for c in judged_on_draws or candidates:
             if self.best is None or (self._known(c), *c.rank()) < (self._known(self.best), *self.best.rank()):
                 self.best = c
             if keeps_all_but_speed(c) and (self.nearest is None or self._speed(c) > self._speed(self.nearest)):
@@ -193,9 +194,9 @@ class _Run:
             return ""
         limit = binding(self.best.margins)
         speed, unit = self._speed(self.best), self.evaluator.request.unit
-        said = f"{math.degrees(speed):.0f} deg/s" if unit == "rad/s" else f"{speed:.3f} m/s"
+        pace = f"{math.degrees(speed):.0f} deg/s" if unit == "rad/s" else f"{speed:.3f} m/s"
         broken = "" if self.best.good else "; not yet within limits"
-        return f": {said}{broken}; binds: {limit}" if limit else f": {said}"
+        return f": {pace}{broken}; binds: {limit}" if limit else f": {pace}"
 
 
 def _kind(c: Candidate) -> tuple[str, tuple[int, int]]:
@@ -225,14 +226,14 @@ class _Refiner:
         return replace(shape, poses=start.poses, offsets=start.offsets) if start.offsets else shape
 
     def generation(self) -> None:
-        """One generation on the nominal robot, and its better part on the ensemble."""
+        """Tries one generation on the nominal robot, and its better part on the ensemble."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
-        judged = run.evaluator.judged([self._shape(x) for x in points], 0)
-        judged = steered(run.evaluator, run.space, judged)
+        judged = run.evaluator.judge([self._shape(x) for x in points], 0)
+        judged = steer(run.evaluator, run.space, judged)
         better = sorted(range(len(judged)), key=lambda k: judged[k].merit)[:math.ceil(TRIED * len(judged))]
         better = [k for k in better if judged[k].nominal is not None]
-        for k, c in zip(better, run.tried([judged[k] for k in better])):
+        for k, c in zip(better, run.try_on_draws([judged[k] for k in better])):
             judged[k] = c
         order = sorted(range(len(judged)), key=lambda k: (k not in better, judged[k].merit))
         cost = np.empty(len(judged))
@@ -248,9 +249,10 @@ class _Refiner:
         self.best = min(self.best, *(judged[k] for k in better), key=Candidate.rank) if better else self.best
 
 
-def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
-    """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
-    need not be searched for. First by as much as it turns, then by the secant of two runs, `times` in all."""
+def steer(evaluator: Evaluator, space: Space, candidates: list[Candidate], times: int = STEERED) -> list[Candidate]:
+    """Steers candidates that drift too much against their drift, and keeps the change where it makes them better: how much a gait
+    turns is known from its run, and need not be searched for. First by as much as it turns, then by the secant of two runs,
+    `times` in all."""
     request, out = evaluator.request, list(candidates)
     if "turn" not in space.names or request.way == "turn":
         return out
@@ -263,7 +265,7 @@ def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate], tim
             if c.nominal is not None and not c.nominal.fell and any(m.kind == "straying" and m.use > 1 for m in c.margins):
                 tried[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
         before = last
-        last = dict(zip(tried, evaluator.judged(list(tried.values()), 0)))
+        last = dict(zip(tried, evaluator.judge(list(tried.values()), 0)))
         for k, c in last.items():
             out[k] = min(out[k], c, key=Candidate.rank)
     return out

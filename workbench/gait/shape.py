@@ -8,10 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 FAMILIES = MappingProxyType({
     "trot": (0.0, 0.5, 0.5, 0.0), "walk": (0.0, 0.5, 0.75, 0.25), "crawl": (0.0, 0.5, 0.75, 0.25), "bound": (0.0, 0.0, 0.5, 0.5),
@@ -63,12 +62,12 @@ class GaitShape:
 
     @property
     def phases(self) -> Array:
-        """Of the poses' arrivals (poses,), as shares of the cycle; the last closes it."""
+        """Phases at which the poses arrive (poses,), as shares of the cycle; the last closes it."""
         return np.asarray((np.arange(self.poses) + 1) / self.poses)
 
     @property
     def period(self) -> float:
-        """Of a cycle [s]."""
+        """Duration of a cycle [s]."""
         return 1 / self.frequency
 
     @staticmethod
@@ -86,11 +85,11 @@ class FootPath:
     """What feet should do at N phases. p: (N, F, 3) [m] of the feet's tips in the base link's frame. stance: (N, F) bool."""
 
     p: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
 
 
 def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: Array | float = 1.0) -> FootPath:
-    """Of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
+    """Path of each foot of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
 
     On the ground a foot goes straight back at an even pace, as the body advances and turns above it; in the air it comes
     forward on half a cosine and up on half a sine. Which foot is which follows from where it is in neutral.

@@ -84,15 +84,15 @@ def _strides(request: Request, length: float) -> dict[str, tuple[float, float]]:
     if request.way == "backward":
         return {"stride": (-along[1], -along[0]), "turn": trim}
     if request.way == "sideways":
-        return {"stride": little, "side": _sided(request, 0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
+        return {"stride": little, "side": _mirror(request, 0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
     if request.way == "turn":
-        return {"stride": little, "turn": _sided(request, 0.1, MOST_TURN)}
+        return {"stride": little, "turn": _mirror(request, 0.1, MOST_TURN)}
     if request.radius is not None:
-        return {"stride": along, "turn": _sided(request, 0.0, min(MOST_TURN, 2 * along[1] / request.radius))}
+        return {"stride": along, "turn": _mirror(request, 0.0, min(MOST_TURN, 2 * along[1] / request.radius))}
     return {"stride": along, "turn": trim}
 
 
-def _sided(request: Request, least: float, most: float) -> tuple[float, float]:
+def _mirror(request: Request, least: float, most: float) -> tuple[float, float]:
     """A range to the left, or its mirror image."""
     return (-most, -least) if request.right else (least, most)
 

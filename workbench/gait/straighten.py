@@ -58,21 +58,21 @@ class TurnResponse:
         return self.share * self.rate / max(abs(speed), SLOWEST)
 
 
-def turn_response(machine: GaitMachine, request: Request, shape: GaitShape, robots: Sequence[RobotModel] = (),
-                  step: float = SEARCH.time_step) -> TurnResponse:
-    """From two rollouts of the nominal robot, and of each of `robots`, which the ensemble has drawn: without FEWEST_ROBOTS of
-    them the response of others is taken to be the nominal one's. step: of the simulation [s]. InputError for a turn in place,
-    or a gait that falls, or one on which `turn` has no effect in the expected direction."""
+def turn_response(machine: GaitMachine, request: Request, shape: GaitShape, robots: Sequence[RobotModel] = ()
+                  ) -> TurnResponse:
+    """Measured in two rollouts of the nominal robot, and of each of `robots`, which the ensemble has drawn: with fewer than
+    FEWEST_ROBOTS of them, other robots are assumed to respond as the nominal one. InputError for a turn in place, for a gait that
+    falls, and for one on which `turn` has no effect in the expected direction."""
     if request.way == "turn":
         raise InputError(None, "a turn in place has no heading to straighten; expected a gait that goes somewhere")
-    evaluator = Evaluator(machine, request, (), n_jobs=1, config=replace(SEARCH, time_step=step))
+    evaluator = Evaluator(machine, request, (), n_jobs=1, config=SEARCH)
     turned = [replace(shape, turn=shape.turn + change) for change in (-PROBE, PROBE)]
-    right, left = evaluator.measured([(s, evaluator.nominal) for s in turned])
+    right, left = evaluator.measure([(s, evaluator.nominal) for s in turned])
     rate = (excess_turning(request, left) - excess_turning(request, right)) / (2 * PROBE)
     if right.fell or left.fell or rate <= 0:
         raise InputError(None, f"the gait does not answer to its turn ({rate:.2g} 1/s); expected one that can be steered")
     speed = (request.progress(left) + request.progress(right)) / 2
-    others = evaluator.measured([(s, robot) for robot in robots for s in turned])
+    others = evaluator.measure([(s, robot) for robot in robots for s in turned])
     pairs = [(a, b) for a, b in zip(others[::2], others[1::2]) if not (a.fell or b.fell)]
     shares = [(excess_turning(request, b) - excess_turning(request, a)) / (2 * PROBE * rate) for a, b in pairs]
     if len(shares) < FEWEST_ROBOTS or not 0.2 < float(np.mean(shares)) < 5.0:
@@ -124,7 +124,7 @@ class Straightener:
         estimate: TurnEstimate | None = None
         shape, out = self.shape, list[float]()
         for metre in range(METRES + 1):
-            (m,) = evaluator.measured([(shape, robot)])
+            (m,) = evaluator.measure([(shape, robot)])
             if m.fell:
                 break
             if estimate is None:

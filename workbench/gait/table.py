@@ -12,7 +12,7 @@ from workbench.files import InputError
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 WAYS = (600, 150)
 """Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.6 s are 1.2 rad/s, a fifth of
@@ -50,7 +50,7 @@ class GaitTable:
 
     @property
     def period(self) -> float:
-        """Of one cycle [s], in whole milliseconds a pose."""
+        """Duration of one cycle [s], in whole milliseconds a pose."""
         return float(self.cycle.dwells_ms.sum()) / 1000
 
 
@@ -70,11 +70,11 @@ class Paths:
     small: Array
     stand: Array
     off: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
 
 
 def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
-    """Of many shapes at once."""
+    """The paths of many shapes at once."""
     wanted = []
     for shape in shapes:
         sizes = np.repeat([1.0, HALF, 0.0], [shape.poses, shape.poses, 1])
@@ -82,9 +82,9 @@ def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
     return [_paths(shape, every, off, stances) for shape, (every, off, stances) in zip(shapes, machine.angles_of(wanted))]
 
 
-def _paths(shape: GaitShape, every: Array, off: Array, stances: NDArray[np.bool_]) -> Paths:
-    """Of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for offsets of
-    another number of poses or joints."""
+def _paths(shape: GaitShape, every: Array, off: Array, stances: Mask) -> Paths:
+    """The paths of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for
+    offsets of another number of poses or joints."""
     P, extra = shape.poses, np.array(shape.offsets)
     if not shape.offsets:
         extra = np.zeros_like(every[:P])
@@ -106,7 +106,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool
              pose_table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
     stop = [pose_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
             pose_table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
-    return GaitTable(shape, cycle, joined(start, source), joined(stop, source), paths.off, q)
+    return GaitTable(shape, cycle, join_tables(start, source), join_tables(stop, source), paths.off, q)
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
@@ -133,7 +133,7 @@ def pose_table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArra
     return PoseTable(machine.model.joints, counts, speeds, dwells, source, units)
 
 
-def joined(parts: list[PoseTable], source: str) -> PoseTable:
+def join_tables(parts: list[PoseTable], source: str) -> PoseTable:
     """One table without sections: the poses of one part after the other, all of the same joints."""
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))

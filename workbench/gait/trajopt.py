@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
 from pydrake.solvers import IpoptSolver, MathematicalProgram, SnoptSolver, SolverOptions
 
@@ -20,7 +19,7 @@ from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape, foot_path
 from workbench.robot import GRAVITY
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 KNOTS = 16
 TORQUE_SHARE = 0.8
@@ -55,7 +54,7 @@ class Planned:
     solver: str
     seconds: float
     q: Array
-    stance: NDArray[np.bool_]
+    stance: Mask
     forces: Array
     p: Array
     tilt: Array
@@ -66,13 +65,13 @@ def plan(machine: GaitMachine, task: Task) -> Planned:
     """Solves the programme, with SNOPT, and if that fails with IPOPT."""
     began = time.perf_counter()
     programme = _Programme(machine, task)
-    told = None
+    result = None
     for solver in (SnoptSolver(), IpoptSolver()):
-        told = solver.Solve(programme.prog, programme.guess, programme.options)
-        if told.is_success():
+        result = solver.Solve(programme.prog, programme.guess, programme.options)
+        if result.is_success():
             break
-    assert told is not None
-    return programme.read(told, time.perf_counter() - began)
+    assert result is not None
+    return programme.read(result, time.perf_counter() - began)
 
 
 class _Programme:
@@ -124,7 +123,7 @@ class _Programme:
         self.guess_q = q
 
     def put(self, variables: Array, values: Array) -> None:
-        """Into the guess."""
+        """Sets the initial guess."""
         self.prog.SetDecisionVariableValueInVector(variables, values, self.guess)
 
     def _kinematics(self) -> None:
@@ -192,15 +191,15 @@ class _Programme:
             guess = self.guess_q[:, columns]
             prog.AddQuadraticErrorCost(0.1 * np.eye(q.size), guess.flatten(), q.flatten())
 
-    def read(self, told: object, seconds: float) -> Planned:
+    def read(self, result: object, seconds: float) -> Planned:
         """The solution, and the shape nearest to it."""
-        get = told.GetSolution  # type: ignore[attr-defined]
+        get = result.GetSolution  # type: ignore[attr-defined]
         q = np.zeros((self.N, len(self.machine.model.joints)))
         for columns, variables in zip(self.columns, self.q):
             q[:, columns] = get(variables)
         p, tilt, place = get(self.p), get(self.tilt), get(self.place)
         forces = get(self.f).reshape(self.N, len(self.legs), 3)
-        return Planned(self.task, bool(told.is_success()), told.get_solver_id().name(), seconds, q,  # type: ignore[attr-defined]
+        return Planned(self.task, bool(result.is_success()), result.get_solver_id().name(), seconds, q,  # type: ignore[attr-defined]
                        self.path.stance, forces, p, tilt, self._nearest(p, tilt, place))
 
     def _nearest(self, p: Array, tilt: Array, place: Array) -> GaitShape:
@@ -218,7 +217,8 @@ class _Programme:
 
 
 class _Foot:
-    """Where a foot is less where it should be (3,) [m], of the base's place and tilt, the leg's angles and the placement."""
+    """Vector (3,) [m] from where a foot should be to where it is, a function of the base's place and tilt, the leg's angles and
+    the placement."""
 
     def __init__(self, leg: Leg, target: Array) -> None:
         self.leg, self.target = leg, target

@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, Certificate, read_certificate
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
@@ -27,6 +27,7 @@ from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.quaternions import matrix
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 SEED = 2_000_000
 """Of the trimmed motion's robots, apart from those of searches and certificates."""
@@ -78,8 +79,8 @@ def read_gait(motion: str | Path, model: RobotModel) -> Gait:
     try:
         return Gait(GaitShape.from_plain(certificate.shape), Request.from_plain(certificate.asked), certificate)
     except (KeyError, TypeError, ValueError):
-        told = "expected a gait's shape and request, as `workbench optimize` writes them; make the gait again"
-        raise InputError(at, told) from None
+        expected = "expected a gait's shape and request, as `workbench optimize` writes them; make the gait again"
+        raise InputError(at, expected) from None
 
 
 def turn_in(recording: str | Path, model: RobotModel, period: float) -> RecordedTurn:
@@ -116,12 +117,12 @@ def trim(machine: GaitMachine, gait: Gait, recorded: RecordedTurn, ensemble: Ens
     (walked,) = examiner.robots([nominal])  # as the certificate walks: another length or start turns by degrees more
     trimmed = replace(request, bias=request.bias - drift(request, walked.measure))
     known = gait.certificate.provenance
-    said = {"workbench": version("drake-workbench"), "drake": version("drake"), "ensemble": Path(ensemble.source).name,
-            "ensemble_sha256": ensemble.sha256, "seed": known.get("seed", 0), "rollouts": 0, "searched in": 0.0,
-            "trimmed": {"turn rad": turned.turn - shape.turn, "heading deg/m": float(np.degrees(recorded.heading)),
-                        "standard deviation deg/m": float(np.degrees(recorded.sd)), "metres": recorded.metres,
-                        "of": dict(gait.certificate.tables)}}
+    origin = {"workbench": version("drake-workbench"), "drake": version("drake"), "ensemble": Path(ensemble.source).name,
+              "ensemble_sha256": ensemble.sha256, "seed": known.get("seed", 0), "rollouts": 0, "searched in": 0.0,
+              "trimmed": {"turn rad": turned.turn - shape.turn, "heading deg/m": float(np.degrees(recorded.heading)),
+                          "standard deviation deg/m": float(np.degrees(recorded.sd)), "metres": recorded.metres,
+                          "of": dict(gait.certificate.tables)}}
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = ensemble.draws(machine.model, options.draws, SEED, Path(folder))
-        certified = certify(machine, trimmed, table, draws, options, progress, said, other)
+        certified = certify(machine, trimmed, table, draws, options, progress, origin, other)
     return Trimmed(recorded, estimate, turned.turn - shape.turn, trimmed, table, certified)

@@ -38,7 +38,8 @@ class RecordedTurn:
 
 
 def recorded_turn(time: Array, p: Array, heading: Array, period: float, source: str = "recording") -> RecordedTurn:
-    """Of a robot's path: time (N,) [s], p (N, 2) [m] along the floor, heading (N,) [rad]. period: of the gait's cycle [s].
+    """The turn that a robot's path shows: time (N,) [s], p (N, 2) [m] along the floor, heading (N,) [rad]. period: of the gait's
+    cycle [s].
 
     Only whole cycles between start and stop count, so that neither has to be known. InputError where there are fewer than three.
     """

@@ -45,10 +45,10 @@ class ReadOff(Protocol):
         """The estimate as an effect of the model."""
     @property
     def mean(self) -> float:
-        """Of its first parameter."""
+        """Mean of the tie's first parameter."""
     @property
     def variance(self) -> float:
-        """Of that mean."""
+        """Variance of that mean."""
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -> Verdict:
@@ -92,7 +92,7 @@ def _family(c: Candidate, confidence: float, others: Sequence[Rival]) -> FamilyB
 
 
 def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
-    """The same effect where the data cannot tell it from this place."""
+    """The same effect at other places that the data cannot tell from this one."""
     return [
         r
         for r in posterior.rivals
@@ -172,7 +172,7 @@ def list_rejected(
 
 
 def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
-    """Of an effect that was tried in a round and not taken."""
+    """Why an effect that was tried in a round was not taken."""
     best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
     if t.screened_out:
         return ScreenedOut(*t.promised)
@@ -219,7 +219,7 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
 
 
 def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
-    """Of each finding and its likeliest rival, where that was fitted and is worth an experiment."""
+    """The tie of each finding with its likeliest rival, where that was fitted and is worth an experiment."""
     return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
                  if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
 
@@ -247,7 +247,8 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
 
 
 def with_read_off(fitted: Posterior, read_off: Sequence[ReadOff]) -> Posterior:
-    """With numbers that no fit identified: where the model has them already with their variance, else one more each."""
+    """The posterior with numbers that no fit identified: where the model has them already with their variance, else one more
+    each."""
     names, mean, covariance = list(fitted.names), fitted.mean, fitted.covariance
     for r in read_off:
         (name,) = parameter_names([r.spec])
@@ -262,7 +263,7 @@ def with_read_off(fitted: Posterior, read_off: Sequence[ReadOff]) -> Posterior:
 
 
 def value_slopes(c: Candidate, x: Array) -> Array:
-    """Of a candidate's values with respect to its sizes."""
+    """Derivatives of a candidate's values by its sizes."""
     steps = 1e-4 * np.eye(c.size)
     columns = [(np.array(c.values(x + h)) - np.array(c.values(x - h))) / 2e-4 for h in steps]
     return np.stack(columns, axis=1) if columns else np.zeros((len(c.neutral), 0))

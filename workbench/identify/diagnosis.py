@@ -12,7 +12,7 @@ from pathlib import Path
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
-from workbench.compare.logged import how_logged
+from workbench.compare.logged import describe_logging
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
@@ -25,6 +25,7 @@ from workbench.identify.evidence.explain import explained_by_evidence, is_by_log
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
+from workbench.identify.heap import give_back
 from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
 from workbench.identify.loads import unloaded_joints
@@ -77,7 +78,7 @@ class _Settings:
 
     @property
     def options(self) -> EvidenceOptions:
-        """Of the search of servo logs."""
+        """Options of the search of servo logs."""
         return EvidenceOptions() if self.previous is None else EvidenceOptions.since()
 
     def provenance(self) -> dict[str, object]:
@@ -112,7 +113,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
 
 
 def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, engine: Mapping[str, str]) -> DiagnosisResult:
-    """By one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
+    """Diagnoses with one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
     progress = settings.progress
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
@@ -133,21 +134,25 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     read_off = (*build.measured, *read_off_registers(session))
     build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
-    sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
-    evidence = sent.evidence
-    begun = Search(sent, known.model).evaluate([])
-    played = TakesAsPlayed(sent, without=settings.without)
-    evaluator, missed = played.without_missed(known.model, begun.residuals)
+    as_built = _again(evaluator, known, takes, progress) if build.measured else evaluator
+    evidence = as_built.evidence
+    start = Search(as_built, known.model).evaluate([])
+    as_played = TakesAsPlayed(as_built, without=settings.without)
+    evaluator, missed = as_played.without_missed(known.model, start.residuals)
     unloaded = unloaded_joints(known.model, evidence)
     pool = build.select_untried(candidates(known.model, evidence, unloaded))
-    pool += read_off_candidates(known.model, evidence, begun.residuals)
+    pool += read_off_candidates(known.model, evidence, start.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
+
+    give_back()
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
     search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
     options = settings.options if gap else settings.options.without_names()
-    found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
+    found = search(Problem(evaluator, known.model, start.residuals, pool, replace(as_played, missed=missed), settings.thorough,
                            progress, options))
+
+    give_back()
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)
@@ -172,7 +177,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at) | how_logged([e.take for e in evidence])
+        | subset_used(found.looked_at) | describe_logging([e.take for e in evidence])
         | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)
@@ -200,7 +205,7 @@ def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake
 def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
-    """Each take before and after. fitted: the model with its effects; None: nothing was found."""
+    """A report of each take before and after the diagnosis. fitted: the model with its effects; None: nothing was found."""
     was = [e.take.observe(nominal[e.name]) for e in evaluator.evidence]
     now = was if fitted is None else evaluator.observe(fitted, evaluator.config)
     out = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from workbench.effects.base import Layer
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, running_means
 from workbench.identify.results.findings import GapEntry
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:
@@ -30,6 +31,7 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
         joints = {c: s for c, s in ill[i].items() if c not in BODY}
         worst = max(joints.values(), default=0.0)
         late = _late(e, residuals[i], [c for c in joints if ACROSS not in c])
+        phases = _phases(e) if joints else _Phases(("", ""), {})
         for c, size in ill[i].items():
             if c in BODY and worst > size:
                 continue
@@ -42,12 +44,13 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
             layer = layer_of(c, c in late, only_on_the_ground)
             rows.append((size, GapEntry(layer=layer, where=() if c in BODY else (joint_of(c),), take=e.name,
                                         when=_when(e, residuals[i][:, column]), error=raw * floor, floor=floor, unit=unit,
-                                        phase=_phase(e, residuals[i][:, column], c))))
+                                        phase=_phase(phases, residuals[i][:, column], joint_of(c)))))
     return tuple(entry for _, entry in sorted(rows, key=lambda row: -row[0]))
 
 
 def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
-    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is fixed."""
+    """The layer of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is
+    fixed."""
     if channel in BODY:
         return "inertia" if channel in ("height", "roll", "pitch") else "ground"
     if ACROSS in channel:
@@ -86,26 +89,36 @@ def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
     return tuple(sorted(sorted(stretches, key=lambda s: s[0] - s[1])[:5]))
 
 
-def _phase(e: TakeEvidence, residual: Array, channel: str) -> str:
-    """Stance or swing of the joint's leg on the ground, moving or holding on a fixed base: where the error is at least twice
-    as large; empty where both are similar."""
-    if channel in BODY:
-        return ""
+@dataclass(frozen=True)
+class _Phases:
+    """Two phases of a take. names: of both; of: by joint, frames in the first phase, and frames whose phase is known."""
+
+    names: tuple[str, str]
+    of: Mapping[str, tuple[Mask, Mask]]
+
+
+def _phases(e: TakeEvidence) -> _Phases:
+    """Stance or swing of each joint's leg on the ground, moving or holding on a fixed base."""
     if e.take.spec.base == "free":
-        foot = _foot_of(e, joint_of(channel))
-        phases = foot_phases(e.take.recorded, e.take.model) if foot else {}
-        if foot not in phases:
-            return ""
-        names, first, known = ("stance", "swing"), phases[foot].stance, phases[foot].known
-    else:
-        commands = e.take.commands
-        if commands is None:
-            return ""
-        steps = np.abs(np.diff(commands.reference(e.take.recorded.since_start), axis=0, prepend=0))
-        names, first, known = ("moving", "holding"), np.asarray(steps.max(axis=1) > 1e-6), np.isfinite(residual)
+        feet = {joint: _foot_of(e, joint) for joint in e.joints}
+        seen = foot_phases(e.take.recorded, e.take.model) if any(feet.values()) else {}
+        return _Phases(("stance", "swing"), {j: (seen[f].stance, seen[f].known) for j, f in feet.items() if f in seen})
+    commands, names = e.take.commands, ("moving", "holding")
+    if commands is None:
+        return _Phases(names, {})
+    steps = np.abs(np.diff(commands.reference(e.take.recorded.since_start), axis=0, prepend=0))
+    moving = np.asarray(steps.max(axis=1) > 1e-6)
+    return _Phases(names, dict.fromkeys(e.joints, (moving, np.ones(len(moving), dtype=bool))))
+
+
+def _phase(phases: _Phases, residual: Array, joint: str) -> str:
+    """The phase in which a joint's error is at least twice as large; empty where both are similar."""
+    if joint not in phases.of:
+        return ""
+    first, known = phases.of[joint]
     good = np.isfinite(residual) & known
     power = [float(np.mean(np.square(residual[m & good]))) if (m & good).any() else 0.0 for m in (first, ~first)]
-    return names[0] if power[0] > 2 * power[1] else names[1] if power[1] > 2 * power[0] else ""
+    return phases.names[0] if power[0] > 2 * power[1] else phases.names[1] if power[1] > 2 * power[0] else ""
 
 
 def _foot_of(e: TakeEvidence, joint: str) -> str:

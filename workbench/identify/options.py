@@ -63,6 +63,8 @@ class ProblemOptions:
     """Of the body's channels [m, m, rad, m, rad, rad]: below this no contact model is believed."""
     still: float = 0.02
     """A joint whose recorded angle covers less than this tells nothing of its servo or gear [rad]."""
+    fastest: float = 2.0
+    """How many times as fast as they were sent a model may play commands: the end of a clock's range."""
     late: float = 0.1
     """Shift of an estimated start that every model is allowed [s]: a robot whose servos received each other's speeds sets out so
     unlike the nominal one that its start was estimated 62 ms early."""

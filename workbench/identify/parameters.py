@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
 from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 Key = tuple[str, tuple[str, ...]]
 """Name and place of an effect."""
@@ -49,7 +48,7 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return self.effect.name
 
     @property
@@ -83,13 +82,13 @@ class Candidate:
         return self.fixed.count(False)
 
     @property
-    def shapes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those of numbers that only shape the effect."""
+    def shapes(self) -> Mask:
+        """Which sizes belong to numbers that only shape the effect."""
         return np.array([p.shapes for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     @property
-    def of_vector(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that are a vector's."""
+    def of_vector(self) -> Mask:
+        """Which sizes are components of a vector."""
         return np.array([p.vector for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     def magnitudes(self, x: Array) -> Array:
@@ -122,7 +121,7 @@ class Candidate:
         return np.asarray(np.clip(x, *self.bounds()))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of the sizes x."""
+        """Bounds of the sizes x, lower and upper."""
         low, high = [], []
         for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
             if fixed:
@@ -140,7 +139,7 @@ class Candidate:
         return np.array(low), np.array(high)
 
     def seldom(self) -> Array:
-        """Of the sizes, those that one in a hundred passes where the effect is there at all; NaN where nobody says."""
+        """For each size, the value that only one in a hundred exceeds where the effect is there at all; NaN where nobody says."""
         out = []
         for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
             if not fixed:
@@ -163,8 +162,8 @@ class Candidate:
         return probes if len(probes) < 2 else both_ways(np.zeros(self.size), probes)
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that make the effect: where all are 0, it is not there."""
+    def makes(self) -> Mask:
+        """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 
     def spec(self, x: Sequence[float] | Array) -> EffectSpec:
@@ -194,7 +193,7 @@ def _size(p: Parameter, value: float, neutral: float, typical: float) -> float:
 
 
 def both_ways(middle: Array, ways: Sequence[Array]) -> list[Array]:
-    """From `middle` each of these ways, forth and back, and the first two together."""
+    """Steps from `middle` along each of these ways, forth and back, and the first two together."""
     signs = (1.0, -1.0)
     return [*(middle + s * way for s in signs for way in ways),
             *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, both_ways
 from workbench.robot.kinematics import Kinematics
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:
@@ -38,7 +37,7 @@ class PointMass(Candidate):
         return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of the sizes x."""
+        """Bounds of the sizes x, lower and upper."""
         low, high = super().bounds()
         low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
@@ -57,8 +56,8 @@ class PointMass(Candidate):
         return [middle, *both_ways(middle, [p - middle for p in probes])]
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those without which there is no effect."""
+    def makes(self) -> Mask:
+        """Which sizes make the effect: where all are 0, it is not there."""
         return np.arange(self.size) == 0
 
 
@@ -75,18 +74,18 @@ class SwungMass(PointMass):
         return 3
 
     @property
-    def shapes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that only shape the effect."""
+    def shapes(self) -> Mask:
+        """Which sizes only shape the effect."""
         return np.array([True, False, False])
 
     @property
-    def of_vector(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that are a vector's."""
+    def of_vector(self) -> Mask:
+        """Which sizes are components of a vector."""
         return ~self.shapes
 
     @property
-    def makes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those without which there is no effect."""
+    def makes(self) -> Mask:
+        """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
@@ -101,7 +100,7 @@ class SwungMass(PointMass):
         return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of the sizes x."""
+        """Bounds of the sizes x, lower and upper."""
         return np.array([FIT.swung_doublings[0], -FIT.most_moment, -FIT.most_moment]), np.array(
             [FIT.swung_doublings[1], FIT.most_moment, FIT.most_moment]
         )

@@ -27,7 +27,8 @@ from workbench.types import Array, Mask, Progress
 
 @dataclass(frozen=True)
 class Prepared:
-    """Takes with a model's rollouts: evidence, by take the rollout of an unconstrained robot, takes left out and why."""
+    """Takes with a model's rollouts: evidence, by take the rollout of an unconstrained robot (of a log, at its rows alone), takes
+    left out and why."""
 
     evidence: list[TakeEvidence]
     nominal: dict[str, Take]
@@ -48,6 +49,7 @@ def prepare(session: Session, takes: Sequence[ReadTake], config: SimulationConfi
     walking = [t for t in registered if t.spec.base == "free"]
     steadied = {t.spec.name: base_states(t.recorded) for t in walking}
     rollouts |= roll(walking, steadied)  # fixed-base takes are judged by what they were registered with
+    nominal |= {t.spec.name: t.observe(nominal[t.spec.name]) for t in registered if not t.recorded.zeroed}
     return Prepared(gather(registered, rollouts, steadied), nominal, left_out)
 
 

@@ -14,6 +14,7 @@ from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
 from workbench.identify.options import PROBLEM
+from workbench.motion.commands import Commands
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -51,12 +52,12 @@ class TakeEvidence:
 
     @property
     def name(self) -> str:
-        """Of the take."""
+        """Name of the take."""
         return self.take.spec.name
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Of the robot, in the model's order."""
+        """Joints of the robot, in the model's order."""
         return self.take.recorded.joints
 
     @property
@@ -75,21 +76,28 @@ class TakeEvidence:
         return np.asarray(self.since >= 0.0)
 
     def looked_at(self, until: float) -> TakeEvidence:
-        """The take cropped to the time until which models are simulated [s after the first command], with a margin for a shifted
-        start, so that neither time nor memory grows with unused data."""
+        """The take and its commands cropped to the time until which models are simulated [s after the first command], with a
+        margin for a shifted start, so that neither time nor memory grows with unused data."""
         frames = int(np.searchsorted(self.since, until + max(PROBLEM.late, LOOP), side="right")) + 1
         early = self.since[:frames] <= until
         rough = self.rough[:frames] if isinstance(self.rough, np.ndarray) and self.rough.ndim == 2 else self.rough
-        return replace(self, take=replace(self.take, recorded=self.take.recorded.first(frames)), recorded=self.recorded[:frames],
-                       offset=self.offset[:frames], contact=self.contact[:frames], rough=rough, until=until,
-                       uses={use: mask[:frames] & early for use, mask in self.uses.items()})
+        early_uses = {use: mask[:frames] & early for use, mask in self.uses.items()}
+        cropped = replace(self, recorded=self.recorded[:frames], offset=self.offset[:frames], contact=self.contact[:frames],
+                          rough=rough, until=until, uses=early_uses)
+        return replace(cropped, take=replace(self.take, recorded=self.take.recorded.first(frames))).played(self.take.commands)
+
+    def played(self, commands: Commands | None) -> TakeEvidence:
+        """The take played by other commands, of which those are kept that can come while models are asked about it."""
+        if commands is not None and np.isfinite(self.until):
+            commands = commands.until(PROBLEM.fastest * (self.until + max(PROBLEM.late, LOOP)))
+        return replace(self, take=replace(self.take, commands=commands))
 
     def zero(self, joint: str) -> float:
-        """Where a joint's recorded angle is zero, on its servo's scale [rad]."""
+        """Recorded zero of a joint's angle, on its servo's scale [rad]."""
         return float(self.take.measurement.rest_pose.get(joint, 0.0)) if self.take.recorded.zeroed else 0.0
 
     def columns(self, joint: str | None = None) -> NDArray[np.int_]:
-        """Of one joint's channels; of every channel."""
+        """Indices of one joint's channels; without a joint, of all."""
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
     def observe(self, rollout: Take, model: RobotModel) -> Array:
@@ -150,7 +158,7 @@ def part_of(since: Array) -> NDArray[np.int_]:
 
 
 def running_sum(columns: Array, frames: int) -> Array:
-    """Of each column (N, c), over `frames` around each frame; what lies beyond the ends is nothing."""
+    """Sum of each column (N, c) over `frames` around each frame; beyond the ends it counts as zero."""
     kernel = np.ones(max(1, frames))
     return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
 

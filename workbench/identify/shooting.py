@@ -17,7 +17,7 @@ from workbench.types import Array, Mask
 
 
 def edges(since: Array) -> Array:
-    """Where windows begin (K,) [s], of a take whose frames are at `since` (N,) [s] after the first command."""
+    """Beginnings of the windows (K,) [s] of a take whose frames are at `since` (N,) [s] after the first command."""
     return np.arange(PROBLEM.window, float(since[-1]) - PROBLEM.window / 4, PROBLEM.window)
 
 

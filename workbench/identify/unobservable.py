@@ -22,8 +22,8 @@ NO_LOAD = "gravity loads none of the joints"
 
 
 def unobservable(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Collection[str] = ()) -> dict[str, str]:
-    """By effect, why these takes cannot show it at any place; by "still joints", those that no take moves. unloaded: joints that
-    nothing loads in these takes (`unloaded_joints`)."""
+    """Why these takes cannot show an effect at any place, by effect; under "still joints", those that no take moves. unloaded:
+    joints that nothing loads in these takes (`unloaded_joints`)."""
     if not evidence:
         return {}
     logs = all(is_log(e) for e in evidence)

@@ -27,6 +27,9 @@ from workbench.recording.servo_log.plausibility import beyond_range
 from workbench.recording.take_from import named_by_model
 from workbench.robot import RobotModel
 
+_IN_FULL = 3
+"""Problems that a line states in full."""
+
 
 class Part(NamedTuple):
     """Part of a session that has problems. kind: "robot", one "take", all "takes", or one prediction ("predict"). name: of a take
@@ -68,7 +71,7 @@ class SessionCheck:
             if part in self.damaged:
                 out += [f"{part} left out: {bad[0]}"] if part.kind == "take" else []
             elif bad:
-                out.append(f"{part}: {summed_up(bad)}")
+                out.append(f"{part}: {summarize(bad)}")
         return out
 
 
@@ -215,17 +218,18 @@ def slow_poses(motion: Motion) -> str | None:
 
 
 def serious(problems: Sequence[str]) -> list[str]:
-    """Those that are not routine."""
+    """The problems that are not routine."""
     return [text for text in problems if not isinstance(text, RoutineProblem)]
 
 
-def summed_up(problems: Sequence[str], most: int = 3) -> str:
+def summarize(problems: Sequence[str]) -> str:
     """Several problems in one line: the first few in full, the rest counted."""
-    more = f" (and {len(problems) - most} more: see workbench inspect)" if len(problems) > most else ""
-    return "; ".join(problems[:most]) + more
+    more = f" (and {len(problems) - _IN_FULL} more: see workbench inspect)" if len(problems) > _IN_FULL else ""
+    return "; ".join(problems[:_IN_FULL]) + more
 
 
 def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
+    """Problems of a take's files, and the duration of its recording [s]. InputError where it cannot be used."""
     model = session.model_of(take)
     recording = readable(take.recording, model)
     out = recording_problems(take.recording, recording, model)
@@ -239,15 +243,16 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    return ([text] if (text := long_work(seconds)) else []) + out, seconds
+    return [*_too_long(seconds), *out], seconds
 
 
 def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:
+    """Problems of a prediction's files, and its duration [s]. InputError where it cannot be predicted."""
     model = session.model_of(entry)
     if entry.commands is not None:
         log = named_by_model(read_recording(entry.commands), model)
         seconds = float(log.time[-1] - log.time[0])
-        return ([text] if (text := long_work(seconds)) else []) + list(log.problems), seconds
+        return [*_too_long(seconds), *log.problems], seconds
     assert entry.start is not None
     assert entry.motion is not None
     start = read_start(entry.start)
@@ -256,4 +261,9 @@ def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str
     motion = load_motion(entry.motion, model)
     motion.commands(entry.cycles)
     out = [f"{entry.motion}: {text}" for text in motion_problems(motion, entry.cycles)]
-    return ([text] if (text := long_work(seconds)) else []) + out, seconds
+    return [*_too_long(seconds), *out], seconds
+
+
+def _too_long(seconds: float) -> list[str]:
+    text = long_work(seconds)
+    return [] if text is None else [text]

@@ -12,6 +12,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.files.errors import UnknownFolderError
+from workbench.files.listing import list_names
 from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
@@ -76,9 +77,9 @@ class Inspection:
             "gaps": None if self.share_of_gaps is None else f"{100 * self.share_of_gaps:.2f} %",
             **{f"  {name}": f"{100 * share:.2f} %" for name, share in list(self.gaps.items())[:_LISTED]},
             **{key: (_names(value) or "none") if isinstance(value, list) else value for key, value in self.details.items()}}
-        said = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
-        width = max(map(len, said))
-        out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in said.items()]
+        shown = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
+        width = max(map(len, shown))
+        out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in shown.items()]
         return "\n".join(out + ([f"  problem: {_line(p)}" for p in self.problems] or ["  no problems"]))
 
 
@@ -274,7 +275,7 @@ def _yaml(path: Path) -> Inspection:
 
 
 def _nominal(path: Path, model: object) -> ServoConstants:
-    """Of a servo of which the file names only the model."""
+    """Constants of a servo of which the file names only the model."""
     try:
         return servo_profile(str(model)).constants()
     except InputError as e:
@@ -301,15 +302,15 @@ def _session(path: Path) -> Inspection:
 
 def _describe_logging(session: Session) -> dict[str, str]:
     """How servo logs were logged; empty where the takes cannot be read, which is reported as their problem."""
-    from workbench.compare.logged import how_logged
+    from workbench.compare.logged import describe_logging
     from workbench.compare.session_takes import read_takes
 
     try:
-        told = how_logged(read_takes(session)[0])
+        logging = describe_logging(read_takes(session)[0])
     except InputError:
         return {}
-    notes = {f"logged: {name}": "; ".join(lines) for name, lines in told.get("logs", {}).items()}
-    return notes | {f"register of {joint}": law for joint, law in told.get("duty_registers", {}).items()}
+    notes = {f"logged: {name}": "; ".join(lines) for name, lines in logging.get("logs", {}).items()}
+    return notes | {f"register of {joint}": law for joint, law in logging.get("duty_registers", {}).items()}
 
 
 def _fitted_model(path: Path) -> Inspection:
@@ -375,8 +376,7 @@ def _finite(value: float) -> float | None:
 
 
 def _names(names: tuple[str, ...] | list[Any]) -> str:
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return f"{len(names)}: {' '.join(map(str, names[:_LISTED]))}{more}" if names else ""
+    return f"{len(names)}: {list_names(list(map(str, names)), _LISTED, ' ')}" if names else ""
 
 
 def _line(text: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Commands:
     joints: tuple[str, ...]
     goals: Array
     speeds: Array
-    enabled: NDArray[np.bool_]
+    enabled: Mask
     end: float
     poses: NDArray[np.int_]
     begun: bool = False
@@ -42,9 +42,15 @@ class Commands:
         """The servos' ramped reference (N, n) [rad] at times t (N,), at first neutral (docs/formats.md, section 4)."""
         t = np.asarray(t, dtype=float)
         reach = np.where(self.speeds > 0, self.speeds, np.inf)
+        dwells = np.diff(self.times).tolist()
         from_ = np.zeros((len(self.times), len(self.joints)))  # the reference when each command comes
-        for k, dwell in enumerate(np.diff(self.times)):
-            from_[k + 1] = from_[k] + _ramp(self.goals[k] - from_[k], reach[k], dwell)
+        for i in range(len(self.joints)):  # in floats, which take a tenth as long as so short arrays
+            angle, held = 0.0, [0.0]
+            for goal, speed, dwell in zip(self.goals[:, i].tolist(), reach[:, i].tolist(), dwells):
+                most = speed * dwell
+                angle += min(max(goal - angle, -most), most)
+                held.append(angle)
+            from_[:, i] = held[:len(from_)]
         last = np.searchsorted(self.times, t, side="right") - 1
         sent = last >= 0
         at = last[sent]
@@ -53,15 +59,23 @@ class Commands:
         return out
 
     def slow_down(self, factor: float) -> Commands:
-        """The same commands, slowed down by a factor."""
+        """The same commands slowed down by a factor: times multiplied, speeds divided by it."""
         return replace(self, times=factor * self.times, speeds=self.speeds / factor, end=factor * self.end)
+
+    def until(self, time: float) -> Commands:
+        """Those that come until then [s]; the same object where that is all of them."""
+        n = int(np.searchsorted(self.times, time, side="right"))
+        if n == len(self.times):
+            return self
+        return replace(self, times=self.times[:n], goals=self.goals[:n], speeds=self.speeds[:n], enabled=self.enabled[:n],
+                       poses=self.poses[:n], end=float(self.times[n]))
 
     def column(self, joint: str) -> int:
         """Index of a joint's column."""
         return self.joints.index(joint)
 
     def reordered(self, joints: tuple[str, ...]) -> Commands:
-        """The same with columns in another order; joints without a command hold neutral, those left out are dropped."""
+        """The same commands with columns in another order; joints without a command hold neutral, those left out are dropped."""
         if joints == self.joints:
             return self
         shape = (len(self.times), len(joints))

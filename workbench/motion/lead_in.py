@@ -14,12 +14,12 @@ SLOW = 0.6
 """Speed of the fastest joint where no table sets one [rad/s]: a tenth of the speed of an AX-12A."""
 
 
-def pace(commands: Commands, count: Array, speed_unit: Array, slow: float = SLOW) -> Commands:
+def pace(commands: Commands, count: Array, speed_unit: Array) -> Commands:
     """The same commands, from neutral, in which no joint that has to move is sent speed 0 (at once).
 
     Such a joint gets the speed that brings it there within the dwell; a speed is rounded up to whole counts, speed_unit (n,)
-    [rad/s]. Where one would have to be faster than `slow` [rad/s] for the very first pose, a command is inserted before it that
-    takes every joint there first, the farthest at `slow`, and everything else is delayed by as much. A distance of at most a
+    [rad/s]. Where one would have to be faster than SLOW for the very first pose, a command is inserted before it that takes every
+    joint there first, the farthest at SLOW, and everything else is delayed by as much. A distance of at most a
     count of position, count (n,) [rad], is ignored. A joint whose torque is off, or comes on with the command, is left as it is.
     """
     before = np.vstack([np.zeros(len(commands.joints)), commands.goals[:-1]])
@@ -30,11 +30,11 @@ def pace(commands: Commands, count: Array, speed_unit: Array, slow: float = SLOW
         return commands
     dwell = np.diff(np.append(commands.times, commands.end))[:, None]
     needed = np.ceil(way / np.maximum(dwell, 1e-3) / speed_unit - 1e-6) * speed_unit
-    first = at_once[0] & (needed[0] > slow)
+    first = at_once[0] & (needed[0] > SLOW)
     speeds = np.where(at_once, needed, commands.speeds)
     if not first.any():
         return replace(commands, speeds=speeds)
-    lead = math.ceil(1000 * float(way[0].max()) / slow) / 1000
+    lead = math.ceil(1000 * float(way[0].max()) / SLOW) / 1000
     ways = np.maximum(np.ceil(way[:1] / lead / speed_unit), 1) * speed_unit
     speeds[0] = commands.speeds[0]  # it is there by then
     return Commands(

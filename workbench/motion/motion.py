@@ -53,8 +53,8 @@ class Motion:
         if len(self.times) < 2 or not self.joints:
             raise InputError(self.source, "expected one joint or more and two rows: where the cycle closes, and a pose")
         if self.start < 0 or self.stop < 0 or self.start + self.stop > len(self.times) - 2:
-            said = f"{self.start} poses of start and {self.stop} of stop"
-            raise InputError(self.source, f"{said}: expected a pose of the loop, too")
+            sections = f"{self.start} poses of start and {self.stop} of stop"
+            raise InputError(self.source, f"{sections}: expected a pose of the loop, too")
         twice = [j for i, j in enumerate(self.joints) if j in self.joints[:i]]
         if twice:
             raise InputError(self.source, f"joint '{twice[0]}' is given twice")
@@ -119,7 +119,8 @@ class Motion:
                        speeds=None if self.speeds is None else self.speeds[rows])
 
     def as_table(self) -> PoseTable:
-        """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for values that the registers cannot hold."""
+        """The motion in the firmware's units (thesis, equations 3.1 to 3.4); InputError for values that the registers cannot
+        hold."""
         return PoseTable.from_angles(
             self.joints, self.times, self.angles, self.source, self.speeds, self.units, self.start, self.stop)
 

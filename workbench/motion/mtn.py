@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
+from workbench.files.listing import list_names
 from workbench.files.numerals import number_of
-from workbench.files.reading import MOST_TEXT, regular_file
+from workbench.files.reading import MOST_TEXT, read_bytes
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT
 from workbench.robot.mounting import Mounting
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class MtnFile:
 
     source: str
     version: str
-    enable: NDArray[np.bool_]
+    enable: Mask
     motor_type: NDArray[np.int64]
     pages: tuple[MtnPage, ...]
 
@@ -71,10 +72,8 @@ class MtnFile:
         found = [p for p in self.used if which is None or p.number == number or p.name == which]
         if len(found) != 1:
             wanted = "one page with steps" if which is None else f"one page '{which}' with steps"
-            there = ", ".join(p.name or str(p.number) for p in self.used[:12]) or "none"
-            more = f" and {len(self.used) - 12} more" if len(self.used) > 12 else ""
-            raise InputError(
-                self.source, f"expected {wanted}, found {len(found)} (name it: FILE.mtn#page); pages: {there}{more}")
+            there = list_names([p.name or str(p.number) for p in self.used], 12) or "none"
+            raise InputError(self.source, f"expected {wanted}, found {len(found)} (name it: FILE.mtn#page); pages: {there}")
         return found[0]
 
     def motion(self, which: str | int | None, bus_ids: Mapping[str, int],
@@ -110,6 +109,8 @@ class MtnFile:
 
 _LONGEST = 600.0
 """Pause or time of a step [s]; the tool writes 2.04 s at most."""
+_LARGEST = 1e9
+"""A number beyond is damage: counts, times and rates are below 1e4."""
 _TAIL = 8
 """Bytes that the tool may leave after the last page, of which two are seen; more is a page that was cut off."""
 _CODE_PAGES = ("utf-8-sig", "cp949", "cp1252", "latin-1")
@@ -139,11 +140,8 @@ def load_mtn(path: str | Path) -> MtnFile:
 
 
 def _text(path: str | Path) -> str:
-    """What stands up to the last page's end, in the first code page that holds all of it."""
-    try:
-        content = regular_file(path, MOST_TEXT).read_bytes()
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    """The text up to the last page's end, in the first code page that can decode all of it."""
+    content = read_bytes(path, MOST_TEXT)
     last = content.rfind(b"page_end")
     end = len(content) if last < 0 else last + len(b"page_end")
     tail = content[end:].strip()
@@ -191,8 +189,8 @@ class _Fields:
         numbers = np.array(words, dtype=float)
         if (count is not None and len(numbers) != count) or not np.isfinite(numbers).all():
             raise InputError(self.path, f"line {line}: {key}: expected {count} finite numbers, found {len(numbers)}")
-        if np.any(np.abs(numbers) > 1e9):
-            raise InputError(self.path, f"line {line}: {key}: expected numbers below 1e9, found '{value[:30]}'")
+        if np.any(np.abs(numbers) > _LARGEST):
+            raise InputError(self.path, f"line {line}: {key}: expected numbers below {_LARGEST:g}, found '{value[:30]}'")
         return numbers
 
     def _entry(self, key: str) -> tuple[int, str]:

@@ -76,12 +76,13 @@ def savitzky_golay(trajectory: Trajectory, window: int, order: int = 3) -> Traje
     return replace(trajectory, q=q, v=v, a=a)
 
 
-def filter_derivatives(trajectory: Trajectory, window: int, order: int = 3) -> Trajectory:
-    """The thesis's own filter (6.7): velocity and acceleration each smoothed separately, angles unchanged.
+def filter_derivatives(trajectory: Trajectory, window: int) -> Trajectory:
+    """The thesis's own filter (6.7): velocity and acceleration each smoothed separately by cubics over `window` samples (odd),
+    angles unchanged.
 
     Then v is not exactly the derivative of q: `inconsistency` measures the difference.
     """
-    v, a = (_local_polynomial(y, window, order, 0, trajectory.step) for y in (trajectory.v, trajectory.a))
+    v, a = (_local_polynomial(y, window, 3, 0, trajectory.step) for y in (trajectory.v, trajectory.a))
     return replace(trajectory, v=v, a=a)
 
 

@@ -53,8 +53,8 @@ class PoseTable:
         if 0 in shape:
             raise InputError(self.source, "expected at least one pose of one joint")
         if self.start < 0 or self.stop < 0 or self.loop < 1:
-            said = f"{self.start} poses of start and {self.stop} of stop"
-            raise InputError(self.source, f"{said}, of {len(self)} in all: expected at least one pose between them, the loop")
+            sections = f"{self.start} poses of start and {self.stop} of stop"
+            raise InputError(self.source, f"{sections}, of {len(self)} in all: expected at least one pose between them, the loop")
         for what, counts, most in (("goal position", self.goals, self._of(lambda u: u.highest)),
                                    ("moving speed", self.speeds, self._of(lambda u: u.fastest))):
             for k, i in np.argwhere((counts < 0) | (counts > most))[:1]:

@@ -20,5 +20,5 @@ class BodyTrack:
     error: Array | None = None
 
     def first(self, frames: int) -> BodyTrack:
-        """Its first frames."""
+        """The track's first frames."""
         return BodyTrack(self.p[:frames], self.quat[:frames], None if self.error is None else self.error[:frames])

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.recording.body_track import BodyTrack
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Take:
     contact: Mapping[str, Array] = field(default_factory=dict)
     commands: Commands | None = None
     problems: tuple[str, ...] = ()
-    mended: NDArray[np.bool_] | None = None
+    mended: Mask | None = None
     off_axis: Array | None = None
     servo_q: Array | None = None
     links: Mapping[str, BodyTrack] = field(default_factory=dict)
@@ -76,7 +75,7 @@ class Take:
         return self.time - self.starts_at
 
     @property
-    def resting(self) -> NDArray[np.bool_]:
+    def resting(self) -> Mask:
         """Frames before the first command."""
         return np.asarray(self.time < self.starts_at - 1e-9)
 
@@ -87,7 +86,7 @@ class Take:
         return replace(self, q=self.q - np.nanmean(self.q[self.resting], axis=0), zeroed=True)
 
     def first(self, frames: int) -> Take:
-        """Its first frames."""
+        """The take's first frames."""
         def cut(column: Array | None) -> Array | None:
             return None if column is None else column[:frames]
 
@@ -105,9 +104,15 @@ class Take:
 
         time = np.asarray(time, dtype=float)
 
+        def hold(row: Array) -> Array:
+            inside = (time >= self.time[0]) & (time <= self.time[-1])
+            return np.broadcast_to(row, (len(time), len(row))) if inside.all() else np.where(inside[:, None], row, np.nan)
+
         def linear(y: Array | None) -> Array | None:
             if y is None:
                 return None
+            if _is_repeated(y):
+                return hold(y[0])
             return np.column_stack([np.interp(time, self.time, c, left=np.nan, right=np.nan) for c in y.T])
 
         def resample_tracks(tracks: Mapping[str, BodyTrack]) -> dict[str, BodyTrack]:
@@ -116,6 +121,8 @@ class Take:
         def slerp(q: Array | None) -> Array | None:
             if q is None:
                 return None
+            if _is_repeated(q):
+                return hold(q[0])
             out = np.full((len(time), 4), np.nan)
             good = np.isfinite(q).all(axis=1)
             if good.sum() < 2:
@@ -137,3 +144,8 @@ class Take:
             bodies=resample_tracks(self.bodies), links=resample_tracks(self.links),
             contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]
         )
+
+
+def _is_repeated(y: Array) -> bool:
+    """Whether it is one row, seen and stored once, as the pose of a base that is held."""
+    return len(y) > 1 and y.strides[0] == 0 and bool(np.isfinite(y[0]).all())

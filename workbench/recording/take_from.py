@@ -37,7 +37,7 @@ def take_from_recording(recording: Recording, measurement: Measurement, model: R
 
 
 def take_from_tracks(tracks: Tracks, measurement: Measurement, model: RobotModel, name: str, base: str) -> Take:
-    """As `take_from_recording`, of repaired tracks."""
+    """The same as `take_from_recording`, from repaired tracks."""
     m = measurement
     angles = joint_angles(tracks, model, m.yaw, base)
     noise = np.array([m.noise.get(j, np.nan) for j in angles.joints])

@@ -30,7 +30,7 @@ class JointFrame:
 
     @property
     def p_BM(self) -> Array:
-        """Where the joint is, (3,) [m] in its child link's frame B."""
+        """Position of the joint, (3,) [m], in its child link's frame B."""
         return -self.X_MB_R.T @ self.X_MB_p
 
     @property
@@ -73,7 +73,7 @@ class Kinematics:
 
     @property
     def mass(self) -> float:
-        """Of the whole robot [kg]."""
+        """Mass of the whole robot [kg]."""
         return sum(self.masses.values())
 
     def joint_of(self, link: str) -> str | None:

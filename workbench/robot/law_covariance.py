@@ -41,7 +41,7 @@ class LawCovariance:
 
     @classmethod
     def of(cls, names: Sequence[str], matrix: Array) -> LawCovariance:
-        """From an array (n, n)."""
+        """The covariance of an array (n, n)."""
         return cls(tuple(names), tuple(tuple(float(v) for v in row) for row in 0.5 * (matrix + matrix.T)))
 
     def among(self, names: Sequence[str]) -> Array:
@@ -53,7 +53,7 @@ class LawCovariance:
         return out
 
     def as_dict(self) -> dict[str, Any]:
-        """As in a file."""
+        """Content of the file."""
         return {"names": list(self.names), "rows": [list(row) for row in self.rows]}
 
 

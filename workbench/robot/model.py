@@ -107,7 +107,7 @@ class RobotModel:
 
     @cached_property
     def held_problems(self) -> tuple[str, ...]:
-        """As `problems`, for a robot whose base is always held: the base's mass, and its feet, do not matter."""
+        """The same as `problems`, for a robot whose base is always held: the base's mass, and its feet, do not matter."""
         about = tuple(text for text in self.source.problems if not text.startswith(f"link '{self.base}' has no <inertial>"))
         return about + model_problems(self.path, self.source.source, self.base)
 
@@ -151,11 +151,11 @@ class RobotModel:
         return self.with_physics(self.servos, effects)
 
     def with_physics(self, servos: Mapping[str, ServoConstants], effects: Sequence[EffectSpec]) -> RobotModel:
-        """As `with_effects`, with these servos, too."""
+        """The same robot with these effects and these servos instead of its own; its description is not read again."""
         return self._sharing(replace(self, servos=servos, effects=tuple(effects)))
 
     def with_held(self, held: bool) -> RobotModel:
-        """The same robot, its base usually held, or not."""
+        """The same robot with its base usually held, or not."""
         return self if held == self.held else self._sharing(replace(self, held=held))
 
     def _sharing(self, other: RobotModel) -> RobotModel:
@@ -180,8 +180,8 @@ class RobotModel:
     def sha256(self) -> str:
         """Hash of the description's content and of everything said about it."""
         digest = hashlib.sha256(self.source.source.read_bytes())
-        said = self.as_dict() | {"description": self.source.source.name}
-        digest.update(yaml.dump(said, Dumper=FAST_YAML, sort_keys=True).encode())
+        content = self.as_dict() | {"description": self.source.source.name}
+        digest.update(yaml.dump(content, Dumper=FAST_YAML, sort_keys=True).encode())
         return digest.hexdigest()
 
     def as_dict(self) -> dict[str, Any]:

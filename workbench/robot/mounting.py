@@ -12,6 +12,7 @@ from typing import Any
 from workbench.files import InputError
 from workbench.files.reading import read_text
 from workbench.files.yaml_file import Fields
+from workbench.robot.names import HIGHEST_BUS_ID
 from workbench.robot.servo_profile import ServoProfile
 
 LEROBOT = {"id", "drive_mode", "homing_offset", "range_min", "range_max"}
@@ -162,9 +163,9 @@ def read_lerobot(path: str | Path, joints: tuple[str, ...]) -> tuple[dict[str, i
         if not good or not all(isinstance(values[k], int) and not isinstance(values[k], bool) for k in LEROBOT):
             raise InputError(path, f"motor {motor}: expected whole numbers for {', '.join(sorted(LEROBOT))}")
         number, mode, low, high = (values[k] for k in ("id", "drive_mode", "range_min", "range_max"))
-        if not low < high or mode not in (0, 1) or not 0 <= number <= 253 or number in ids.values():
+        if not low < high or mode not in (0, 1) or not 0 <= number <= HIGHEST_BUS_ID or number in ids.values():
             raise InputError(path, f"motor {motor}: expected range_min below range_max, drive_mode 0 or 1, and an id of its own, "
-                                   f"at most 253; got {low}, {high}, {mode}, {number}")
+                                   f"at most {HIGHEST_BUS_ID}; got {low}, {high}, {mode}, {number}")
         ids[motor] = number
         mountings[motor] = Mounting(-1 if mode else 1, zero=(low + high) / 2, homing=values["homing_offset"])
     return ids, mountings

@@ -9,6 +9,8 @@ JOINTS: tuple[str, ...] = (
 )
 """The thesis's alphabetical order, of every table that has columns without a header."""
 
+HIGHEST_BUS_ID = 253
+"""Of a servo; 254 addresses all servos of a bus at once."""
 BUS_IDS = MappingProxyType(
     dict(zip(JOINTS, (15, 13, 11, 14, 12, 10, 9, 7, 5, 8, 6, 4, 17, 16, 1)))
 )

@@ -26,8 +26,9 @@ class JointRange:
 
 
 def joint_ranges(model: RobotModel) -> dict[str, JointRange]:
-    """By joint: the narrower of the model file's limits and of the table joint_ranges.csv, which for the puppy ships with the
-    workbench and for another robot lies beside its model file, if there is one. InputError names line and joint of the table."""
+    """Range of each joint: the narrower of the model file's limits and of the table joint_ranges.csv, which for the puppy ships
+    with the workbench and for another robot lies beside its model file, if there is one. InputError names line and joint of the
+    table."""
     table = data_file(TABLE) if model.description == PUPPY else model.path.parent / TABLE
     known = _read(table, model) if model.description == PUPPY or table.is_file() else {}
     out = {}

@@ -10,7 +10,7 @@ from workbench.files import InputError
 from workbench.files.yaml_file import Fields, read_yaml
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.mounting import Mounting, read_lerobot, read_mountings
-from workbench.robot.names import BUS_IDS, RIGID_BODIES
+from workbench.robot.names import BUS_IDS, HIGHEST_BUS_ID, RIGID_BODIES
 from workbench.robot.servo_constants import KEYS, ServoConstants, servo_constants
 from workbench.robot.servo_profile_file import servo_profile, with_family_law
 
@@ -107,9 +107,9 @@ def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
     ids: dict[str, int] = {}
     for joint, number in given.items():
         _name(given, joint, joint, "joint", joints)
-        good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 253
+        good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= HIGHEST_BUS_ID
         if not good or number in ids.values():
-            raise given.error(joint, f"expected a bus ID of its own from 0 to 253, got {number!r}")
+            raise given.error(joint, f"expected a bus ID of its own from 0 to {HIGHEST_BUS_ID}, got {number!r}")
         ids[joint] = number
     return ids
 
@@ -140,7 +140,7 @@ def _constants(f: Fields, key: str, value: Any, by_family: bool) -> ServoConstan
 
 
 def _nominal(f: Fields, key: str, name: Any) -> ServoConstants:
-    """Of a servo of which only the name is known."""
+    """Constants of a servo of which only the name is known."""
     try:
         return replace(servo_profile(str(name)).constants(), model=str(name))
     except InputError as e:

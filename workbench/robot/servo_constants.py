@@ -146,20 +146,21 @@ class ServoConstants:
         return given[key] / value if value else 0.0
 
     def constants(self) -> dict[str, Any]:
-        """By key, None where the other position law's; what only some servos do is left out where this one does not."""
+        """The constants by key, None for keys of the other position law; what only some servos do is left out where this one does
+        not."""
         out = {key: getattr(self, key) for key in KEYS
                if key != "covariance" and (key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key])}
         return out | ({"torque_tables": [t.as_dict() for t in self.torque_tables]} if self.torque_tables else {})
 
     def as_dict(self) -> dict[str, Any]:
-        """As in servo.yaml."""
+        """Content of servo.yaml."""
         known = dict(self.sd)
         together = {} if self.covariance is None else {"covariance": self.covariance.as_dict()}
         return {k: {"value": v, "sd": known[k]} if k in known else v
                 for k, v in self.constants().items() if v is not None} | together
 
     def updated(self, changes: dict[str, Any]) -> ServoConstants:
-        """With some keys replaced; a switch between the two position laws drops the other's keys."""
+        """The constants with some keys replaced; a switch between the two position laws drops the other's keys."""
         changes = dict(changes)
         if changes.get("proportional_gain") is not None:
             for key in ("compliance_slope", "compliance_margin", "punch"):

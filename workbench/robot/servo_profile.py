@@ -25,7 +25,7 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class Register:
-    """Where a number lies in a servo's control table. sign: "" for none, "two" for two's complement, or the bit of the sign."""
+    """Place of a number in a servo's control table. sign: "" for none, "two" for two's complement, or the bit of the sign."""
 
     name: str
     address: int

@@ -86,10 +86,10 @@ def servo_profile(model: str) -> ServoProfile:
 
 
 def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:
-    """The constants, with parts of the servo's law that their file omits taken from its family's profile, with its uncertainty.
+    """The constants, with parts of the servo's law that their file omits taken from its family's profile, with their uncertainty.
 
     given: keys of the file; their values are kept, including 0. Servos of an unknown family stay as they are. Keys of the law by
-    proportional gain is not added to a servo with the law by compliance.
+    proportional gain are not added to a servo with the law by compliance.
     """
     family = _family_of(servo.model)
     if family is None:
@@ -140,21 +140,12 @@ def _range(f: Fields, key: str) -> tuple[float, float]:
     return float(value[0]), float(value[1])
 
 
-def _by_number(f: Fields) -> dict[int, Any]:
-    out: dict[int, Any] = {}
-    for key, value in list(f._left.items()):
-        if isinstance(key, bool) or not isinstance(key, int) or key < 0:
-            raise f.error(str(key), "expected a whole number as key")
-        out[key] = value
-    return out
-
-
 def _names(f: Fields) -> Mapping[int, str]:
-    return {k: str(v) for k, v in _by_number(f).items()}
+    return {k: str(v) for k, v in f.numbered().items()}
 
 
 def _bit_rates(f: Fields) -> Mapping[int, int]:
-    rates = _by_number(f)
+    rates = f.numbered()
     for key, rate in rates.items():
         if isinstance(rate, bool) or not isinstance(rate, int) or rate < 1:
             raise f.error(str(key), f"expected bit/s, got {rate!r}")
@@ -172,7 +163,7 @@ def _registers(f: Fields) -> Mapping[str, Register]:
         out[name] = Register(name, int(value[0]), int(value[1]), sign)
     missing = [name for name in _NEEDED if name not in out]
     if missing:
-        raise f.error(", ".join(missing), "is missing" if len(missing) == 1 else "are missing")
+        raise f.missing(missing)
     return out
 
 
@@ -213,7 +204,7 @@ def _nominal(f: Fields) -> Mapping[str, Uncertain]:
     f.done()
     missing = sorted(REQUIRED - set(out))
     if missing:
-        raise f.error(", ".join(missing), "is missing" if len(missing) == 1 else "are missing")
+        raise f.missing(missing)
     return out
 
 
@@ -241,10 +232,10 @@ def _marker(f: Fields, registers: Mapping[str, Register]) -> str | None:
 
 
 def _group_read(f: Fields) -> Literal["", "sync", "feetech", "bulk"]:
-    said = f.text("group_read") or ""
-    if said not in ("", "sync", "feetech", "bulk"):
-        raise f.error("group_read", f"expected sync, feetech or bulk, got {said!r}")
-    return said  # type: ignore[return-value]  # one of them
+    kind = f.text("group_read") or ""
+    if kind not in ("", "sync", "feetech", "bulk"):
+        raise f.error("group_read", f"expected sync, feetech or bulk, got {kind!r}")
+    return kind  # type: ignore[return-value]  # one of them
 
 
 def _register_name(f: Fields, registers: Mapping[str, Register]) -> str:

@@ -39,11 +39,11 @@ class Departure:
     effect: EffectSpec | None = None
 
     def __str__(self) -> str:
-        said = f"{self.joint}: {self.key} is {self.found:g}, the model has {self.nominal:g}"
+        text = f"{self.joint}: {self.key} is {self.found:g}, the model has {self.nominal:g}"
         if self.effect is None:
-            return said
+            return text
         values = ", ".join(f"{k} {v:.3g}" for k, v in self.effect.parameters.items() if isinstance(v, float))
-        return f"{said} ({self.effect.effect}, {values})"
+        return f"{text} ({self.effect.effect}, {values})"
 
 
 @dataclass(frozen=True)

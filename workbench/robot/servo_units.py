@@ -51,8 +51,8 @@ def units_of(model: RobotModel, joints: Sequence[str]) -> tuple[ServoUnits, ...]
 
 
 def known_units(model: RobotModel, joints: Sequence[str]) -> tuple[ServoUnits, ...]:
-    """As `units_of`, for what reaches a real servo; InputError where nobody knows a family, as another one's counts would turn
-    its joint to another angle."""
+    """The same as `units_of`, for goals that reach a real servo; InputError for an unknown family, as the counts of another would
+    turn its joint to another angle."""
     for joint in joints:
         reason = unknown_family(model.servo(joint).model)
         if reason:

@@ -50,7 +50,7 @@ class TorqueTable:
         return 1.0 if UNITS[self.depends_on] == "1" else math.radians(1.0)
 
     def as_dict(self) -> dict[str, Any]:
-        """As servo.yaml has it."""
+        """Content of servo.yaml."""
         return {"depends_on": self.depends_on, "at": [float(x) for x in self.at], "torque": [float(x) for x in self.torque]}
 
 

@@ -1,4 +1,4 @@
-"""Brings the servo bank into a diagram, on any plant whose joints it is given."""
+"""Adds the servo bank to a diagram, on any plant that has the model's joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HOLDING_DAMPING = 1e3
 """Damping [N m s/rad] below which Coulomb friction creeps in discrete plants: at 0.06 N m a joint at rest creeps by less
 than 0.06/1000 rad/s (0.003 deg/s)."""
 MOST_CREEP = 6e-5
-"""[rad/s] of a joint at rest whose friction varies, as that of 0.06 N m at HOLDING_DAMPING."""
+"""Largest creep of a joint at rest whose friction varies [rad/s]: that of 0.06 N m at HOLDING_DAMPING."""
 
 
 def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
@@ -84,8 +84,8 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
     default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
     CENIC's does not: it steps over them and slides without friction). `law`: replaces the model's nominal constants.
-    `terms`: behaviour of servos beyond the law. A goal_delay of the model is in the commands of `simulate`, not in the bank: who
-    sends goals himself sends them that much later. In a discrete plant they take `period` to be its step, and make its output
+    `terms`: behaviour of servos beyond the law. A goal_delay of the model is in the commands of `simulate`, not in the bank: code
+    that sends goals itself sends them that much later. In a discrete plant they take `period` to be its step, and make its output
     ports unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that
     varies needs bristles or a discrete plant. InputError for a plant that is finalized, lacks a joint, or does not support
     `friction`, and for a model with effects, which MakeStation takes.

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
 from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class ServoLaw:
 
     @property
     def damping(self) -> Array:
-        """All that a joint loses per speed while its servo is on: back-EMF and viscous friction [N m s/rad]."""
+        """Damping of a joint whose servo is on: back-EMF and viscous friction [N m s/rad]."""
         return self.back_emf + self.viscous
 
     def duty(self, error: Array, velocity: Array | float = 0.0) -> Array:
@@ -69,7 +68,7 @@ class ServoLaw:
         size = np.where(beyond > 0, self.punch + self.gain * beyond, 0.0)
         return np.asarray(np.clip(np.copysign(size, error) - self.derivative * velocity, -1.0, 1.0))
 
-    def motor_torque(self, error: Array, velocity: Array, enabled: NDArray[np.bool_] | bool = True) -> Array:
+    def motor_torque(self, error: Array, velocity: Array, enabled: Mask | bool = True) -> Array:
         """Torque of the motor at the joint [N m], before friction: duty torque less back-EMF, 0 with torque disabled."""
         torque = self.duty(error, velocity) * self.full_torque - self.back_emf * velocity
         return np.asarray(np.where(enabled, torque, 0.0), dtype=float)

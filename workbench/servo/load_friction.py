@@ -1,4 +1,4 @@
-"""Dry friction that grows with the load of the gear, of the nominal law and of effects."""
+"""Dry friction that grows with the gear's load, in the nominal law and in effects."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.servo.terms import Instant, ServoTerm, TermNumbers
 from workbench.types import Array
 
 MOST_LOAD = 2.0
-"""Of the torque at full duty: beyond it friction grows no further, as the solver needs a bound."""
+"""Load, as a share of the torque at full duty, beyond which friction grows no further: the solver needs a bound."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +25,16 @@ class LoadFrictionTerm(ServoTerm):
     backdrive: Array
 
     def friction(self, now: Instant) -> Array:
-        """By the load [N m]."""
+        """Friction (n,) [N m] at the present load."""
         share = self.coefficient + self.static * np.exp(-np.square(now.velocity / self.speed))
         share = share + self.backdrive * np.maximum(-np.sign(now.motor) * now.direction, 0.0)
         return np.asarray(share * np.abs(now.load))
 
     def most_friction(self, law: ServoLaw) -> Array:
-        """At MOST_LOAD [N m]."""
+        """Friction (n,) [N m] at MOST_LOAD."""
         return np.asarray((self.coefficient + self.static + self.backdrive) * MOST_LOAD * law.full_torque)
 
     def numbers(self) -> TermNumbers:
-        """All of it."""
+        """All numbers of the term."""
         return TermNumbers(rubbing=self.coefficient, rubbing_still=self.static, rubbing_speed=self.speed,
                            rubbing_backwards=self.backdrive)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint
@@ -20,7 +19,7 @@ from pydrake.systems.framework import (
 )
 
 from workbench.servo.law import ServoLaw
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 BRISTLE_SLIP = 5e-4
 """Deflection [rad] at which a bristle of a continuous plant yields; a tenth of a count, so that no sensor sees it."""
@@ -119,12 +118,12 @@ class ServoBank(LeafSystem):
         with np.errstate(divide="ignore"):
             return -np.expm1(-seconds / self.law.lag)
 
-    def _command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
+    def _command(self, context: Context) -> tuple[Array, Array, Array, Mask | None]:
         """Goal (n,) [rad], how far down and up the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all;
         cached while inputs last."""
         return self._cached_command.Eval(context)  # type: ignore[no-any-return]
 
-    def _calc_command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
+    def _calc_command(self, context: Context) -> tuple[Array, Array, Array, Mask | None]:
         speed = self._speed.Eval(context) if self._speed.HasValue(context) else np.zeros(len(self.joints))
         step = np.minimum(np.where(speed > 0, speed * self._period, np.inf), self._own_step)
         on = self._enable.Eval(context) > 0.5 if self._enable.HasValue(context) else None
@@ -170,7 +169,7 @@ class ServoBank(LeafSystem):
         return np.asarray(np.clip(force, -self.law.coulomb, self.law.coulomb), dtype=float)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Of the bristles."""
+        """Derivatives of the bristles' deflections [rad/s]."""
         if self._bristles:
             derivatives.SetFromVector(self._bristle_rate(context, self._state.Eval(context)[self._x_v])[1])
 

@@ -43,7 +43,7 @@ class Tabled(ServoTerm):
         return float(value)
 
     def numbers(self) -> TermNumbers:
-        """All of it."""
+        """All numbers of the term."""
         return TermNumbers(tables=self.tables)
 
 

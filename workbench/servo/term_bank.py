@@ -36,8 +36,8 @@ class _Parts:
 
 
 class TermBank(ServoBank):
-    """As ServoBank, with `terms`; duty torque times their strengths, motor torque saturated and cut at their lowest ceiling,
-    friction raised.
+    """A ServoBank with `terms`: duty torque is multiplied by their strengths, motor torque saturated and cut at their lowest
+    ceiling, and friction raised.
 
     Further ports: input `net_actuation` (of the plant; needed where friction varies in a discrete plant), output
     `friction_relief` (n) N m.
@@ -99,7 +99,7 @@ class TermBank(ServoBank):
         context.get_mutable_numeric_parameter(self._first_command).SetFromVector([time])
 
     def SetReference(self, context: Context, reference: Array) -> None:
-        """As in ServoBank; joints may have been moved, so that the last step cannot predict the next."""
+        """The same as in ServoBank; joints may have been moved, so that the last step cannot predict the next."""
         super().SetReference(context, reference)
         context.SetDiscreteState(self._memory, np.zeros(4 * len(self.joints) + 1))
 

@@ -14,10 +14,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Instant:
-    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) and angle (n,) of the joints [rad/s,
-    rad]; duty (n,), 0 with torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it.
-    Known where friction is asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or
-    would but for friction."""
+    """State of n servos at an instant. elapsed: since the first command, 0 before it [s]; velocity (n,) and angle (n,) of the
+    joints [rad/s, rad]; duty (n,), 0 with torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank
+    finds it. Known where friction is asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint
+    turns, or would but for friction."""
 
     elapsed: float
     velocity: Array

@@ -35,7 +35,7 @@ def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int
 
 
 def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
-    """The same takes one by one, each as soon as it and those before it are done, while the others continue.
+    """The takes of `simulate_batch` one by one, each as soon as it and those before it are done, while the others continue.
 
     Jobs that the compiled station covers run in threads of this process, the rest in processes."""
     if n_jobs == 1 or len(jobs) == 1:

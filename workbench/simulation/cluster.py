@@ -17,10 +17,11 @@ def on_cluster() -> bool:
 
 
 def in_blocks(function: Callable[[Sequence[Any]], list[T]], items: Sequence[Any], n_jobs: int) -> Iterator[T]:
-    """The results of a function of several items, one for each item, in their order.
+    """Results of a function that takes several items and returns one result for each, in their order.
 
     Each worker gets one block of neighbouring items: a rollout takes milliseconds, about as long as a scheduler needs for a task.
-    function: importable, as are its items, so that workers can load them. n_jobs: blocks at least."""
+    function and items: importable, so that workers can load them. n_jobs: least number of blocks, if there are as many items.
+    """
     from joblib import Parallel, delayed, effective_n_jobs
 
     count = max(1, min(len(items), max(n_jobs, effective_n_jobs(-1))))

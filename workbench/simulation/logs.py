@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.planning import RobotDiagram
 from pydrake.systems.framework import Context
 
@@ -13,7 +12,7 @@ from workbench.servo import ServoLaw
 from workbench.servo.bank import servo_joints
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.gantry import AXES, base_poses
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log", "motor_torque_log", "friction_relief_log")
 
@@ -49,7 +48,7 @@ class RunLogs:
         return state[:, self._q], state[:, self._plant.num_positions() + self._v]
 
     def joints_named(self, names: tuple[str, ...], state: Array) -> tuple[Array, Array]:
-        """As `joints`, of any joints of the plant with one angle each."""
+        """The same as `joints`, for any joints of the plant with one angle each."""
         found = [self._plant.GetJointByName(n) for n in names]
         q, v = ([j.position_start() for j in found], [j.velocity_start() for j in found])
         return state[:, q], state[:, self._plant.num_positions() + np.array(v, dtype=int)]
@@ -80,7 +79,7 @@ class RunLogs:
             return np.asarray(drake - self._law.damping * v)
         if self._diagram.HasSubsystemNamed("motor_torque_log"):
             return np.asarray(self.read("motor_torque")[1] - self._law.viscous * v + drake + self.read("friction_relief")[1])
-        enabled: NDArray[np.bool_] | bool = True
+        enabled: Mask | bool = True
         if commands is not None and not commands.enabled.all():
             row = np.clip(np.searchsorted(commands.times, since_start + 1e-9, side="right") - 1, 0, None)
             enabled = commands.enabled[row]

@@ -65,7 +65,7 @@ class BaseSetter:
         self._turned: list[tuple[float, Array, Rotation]] = []
 
     def put(self, k: int, time: float) -> None:
-        """To state number k, at a time [s] of the run."""
+        """Puts the base into state number k, at a time [s] of the run."""
         states = self.states
         X_WB = self._plant.GetFreeBodyPose(self._context, self._base)
         V_WB = self._base.EvalSpatialVelocityInWorld(self._context)

@@ -51,7 +51,7 @@ class SteppedRun:
 
     @property
     def state(self) -> Start:
-        """Where the robot is now; another run starts from it."""
+        """Present state of the robot, from which another run may start."""
         self._check_alive()
         return self._simulation._present_state()
 

@@ -38,7 +38,7 @@ class Playback:
 
 
 def since_start(take: Take) -> Array:
-    """Time since the first command (N,) [s]; since the first frame, where nobody knows when the first command came."""
+    """Time since the first command (N,) [s]; since the first frame if the time of the first command is unknown."""
     return take.since_start if np.isfinite(take.starts_at) else np.asarray(take.time - take.time[0])
 
 

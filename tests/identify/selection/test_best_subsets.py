@@ -10,7 +10,7 @@ from tests.identify.small import search_on
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
-from workbench.identify.selection.best_subsets import Response, begun_again, best_sets, several, variants
+from workbench.identify.selection.best_subsets import Response, best_sets, restart_fit, several, variants
 
 
 def seen(name, signature, size=1.0):
@@ -88,9 +88,9 @@ def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_fa
                              evaluating=lambda *starts: asks_nothing([fit_at(s, 1e4) for s in starts]),
                              refitting=lambda *a: asks_nothing(ended(*a)), refit=ended)
     here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + FIT.least_gain * 3)
-    there = begun_again(search, here, (0,), 9)
+    there = restart_fit(search, here, (0,), 9)
     assert (there is not here) is again
     assert {tuple(np.sign(f.x[:2] - here.x[:2])) for f in begun} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}
     assert all(f.x[2] == 2.0 for f in begun)
     alone = fit_at([(play, np.array([2.0]))], 100.0)
-    assert begun_again(search, alone, (0,), 9) is alone
+    assert restart_fit(search, alone, (0,), 9) is alone

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from workbench.compare.session import load_session
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis
 from workbench.robot import data_file
+from workbench.types import Progress
 from workbench.view.figures.gap import before_after
 from workbench.view.report.diagnosis import write_diagnosis
 from workbench.view.report.page import Part, Picture, Section, Text
@@ -26,13 +26,13 @@ _MORE = (
 
 @dataclass(frozen=True)
 class Found:
-    """section: of the demo's page. said: verdict and findings in a sentence."""
+    """The diagnosis in the demo: its section of the page, and its verdict in a sentence."""
 
     section: Section
-    said: str
+    headline: str
 
 
-def diagnosis_section(folder: Path, progress: Callable[[str, float | None], None]) -> Found:
+def diagnosis_section(folder: Path, progress: Progress) -> Found:
     """Diagnoses the bundled logs of an arm and writes the diagnosis into `folder`. progress: called with the current stage and
     the share done."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from workbench.gait.refine import RefineOptions
 from workbench.gait.request import Request
 from workbench.motion import load_motion
 from workbench.robot import RobotModel
+from workbench.types import Progress
 from workbench.view.report.gait import write_gait_page
 from workbench.view.report.page import Part, Section, Text
 
@@ -34,7 +34,7 @@ def demo_options() -> OptimizeOptions:
                    screening=Screening((8,), certified=2), refine=RefineOptions(iterations=0))
 
 
-def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:
+def gait_section(folder: Path, model: RobotModel, progress: Progress) -> Section:
     """Searches for a gait, writes it with its certificate and page into `folder`, and its firmware tables if its certificate is
     good."""
     request = Request(speed=SPEED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
+from workbench.types import Progress
 from workbench.view.figures import body_attitude, body_path, by_joint, film_strip, footfalls, joint_grid, joint_torques, stance_of
 from workbench.view.report.comparison import headline, take_section
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
@@ -65,7 +66,7 @@ class Demo:
     comparison: Comparison
 
 
-def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Demo:
+def run_demo(folder: Path, progress: Progress) -> Demo:
     """Simulates, compares, exports and writes everything into `folder`; progress: called with the stage and the share done."""
     began = time.monotonic()
     model = puppy_model()
@@ -84,7 +85,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     lengths = [_end(take)[0] for take in takes.values()]
     report = Report(
         "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and "
-        f"contact. The bundled arm: {diagnosed.said}",
+        f"contact. The bundled arm: {diagnosed.headline}",
         _SUMMARY, [(label, f"{_end(t)[0]:.1f} cm", f"heading {_heading(t):+.1f}°") for label, t in takes.items()],
         Provenance.of(model, seconds=time.monotonic() - began))
     report.add(_walk_section(rows, takes, model, folder))
@@ -95,10 +96,10 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     report.add(_firmware_section(motion, folder / "firmware", violations))
     report.add(gait_section(folder / "gait", model, progress))
     progress("drawing the report", None)
-    return Demo(_as_text(rows), headline(comparison), diagnosed.said, report.write(folder / "report.html"), comparison)
+    return Demo(_as_text(rows), headline(comparison), diagnosed.headline, report.write(folder / "report.html"), comparison)
 
 
-def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:
+def _walks(model: RobotModel, motion: Motion, progress: Progress) -> dict[str, Take]:
     """The four runs by label, beginning with the servo law in point contact."""
     labels = [f"{DRIVES[drive]}, {contact}" for drive, contact in RUNS]
     configs = [SimulationConfig(drive=drive, contact=contact, engine="drake") for drive, contact in RUNS]
@@ -143,11 +144,11 @@ def _firmware_section(motion: Motion, folder: Path, violations: tuple[Violation,
     table = motion.as_table()
     rows = [[str(k + 1), str(table.dwells_ms[k]), *map(str, goals)] for k, goals in enumerate(table.goals)]
     names = ", ".join(f"`{path.name}`" for path in sorted(folder.iterdir()))
-    said = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
+    result = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
     return Section("Onto the robot", [
         Text(f"{names} in `firmware/`, checked against each servo's range, speed and, as it ran in simulation, torque."),
         Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, table.families)) + "."),
-        Details("Result of the check", [Text(said)])])
+        Details("Result of the check", [Text(result)])])
 
 
 def _as_text(rows: list[Row]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.ports import GONE, port_gone
-from workbench.device.link import AnswerMessage, FrameReader, FrameType, StateMessage, frame, message
+from workbench.device.link import AnswerMessage, FrameReader, FrameType, StateMessage, decode_message, encode_frame
 
 RATE = 57_600
 """Of the PC link [bit/s]."""
@@ -24,7 +24,7 @@ def enter_bridge(port: Any) -> None:
     try:
         for _ in range(TRIES):
             port.clearPort()
-            port.writePort(list(frame(FrameType.BRIDGE)))
+            port.writePort(list(encode_frame(FrameType.BRIDGE)))
             answer, state = _answer(port)
             doing = f"; it is at {state.state.name}: {state.reason}" if state is not None else doing
             if answer is not None and answer.well:
@@ -41,7 +41,7 @@ def enter_bridge(port: Any) -> None:
 def leave_bridge(port: Any) -> None:
     """Ends the bridge; if the message is lost, the controller notices within a second."""
     with suppress(*GONE):
-        port.writePort(list(frame(FrameType.BRIDGE_END)))
+        port.writePort(list(encode_frame(FrameType.BRIDGE_END)))
 
 
 def _answer(port: Any) -> tuple[AnswerMessage | None, StateMessage | None]:
@@ -49,11 +49,11 @@ def _answer(port: Any) -> tuple[AnswerMessage | None, StateMessage | None]:
     deadline = port.getCurrentTime() + WAIT
     while port.getCurrentTime() < deadline:
         for got in reader.feed(bytes(port.readPort(256))):
-            said = message(got)
-            if isinstance(said, StateMessage):
-                state = said
-            if isinstance(said, AnswerMessage) and said.type == FrameType.BRIDGE:
-                return said, state
+            answer = decode_message(got)
+            if isinstance(answer, StateMessage):
+                state = answer
+            if isinstance(answer, AnswerMessage) and answer.type == FrameType.BRIDGE:
+                return answer, state
     return None, state
 
 

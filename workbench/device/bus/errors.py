@@ -6,16 +6,17 @@ from workbench.files import InputError
 
 
 class BusError(InputError):
-    """Something that the bus did not do. servo, joint, register: where; None where it is nobody's in particular."""
+    """A failure on the bus. servo (bus ID), joint, register: where it happened, None where no single one is concerned; cause: the
+    problem without that place."""
 
     def __init__(self, problem: str, servo: int | None = None, joint: str | None = None, register: str | None = None) -> None:
-        self.servo, self.joint, self.register, self.said = servo, joint, register, problem
+        self.servo, self.joint, self.register, self.cause = servo, joint, register, problem
         name = None if servo is None else f"servo {servo}" + (f" ({joint})" if joint else "")
         place = ", ".join(part for part in (name, register and f"register {register}") if part)
         super().__init__(None, f"{place}: {problem}" if place else problem)
 
     def __reduce__(self) -> tuple[type[BusError], tuple[object, ...]]:  # type: ignore[override]
-        return type(self), (self.said, self.servo, self.joint, self.register)
+        return type(self), (self.cause, self.servo, self.joint, self.register)
 
 
 class NoAnswerError(BusError):

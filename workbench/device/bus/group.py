@@ -100,7 +100,7 @@ def _protocol2(heard: bytes, at: int, count: int) -> tuple[int, int, bytes, int]
 
 
 def crc16(data: bytes) -> int:
-    """Of protocol 2: polynomial 0x8005, from 0."""
+    """Checksum of protocol 2: polynomial 0x8005, initial value 0."""
     crc = 0
     for byte in data:
         crc = (crc << 8 ^ _CRC[(crc >> 8 ^ byte) & 0xFF]) & 0xFFFF

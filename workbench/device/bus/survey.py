@@ -81,7 +81,7 @@ class Survey:
         return [f"{len(off)} of {len(self.found)} servos read {span}; expected {low:g} to {high:g} V"]
 
     def registers(self) -> ServoRegisters:
-        """As evidence of a session."""
+        """The registers as evidence of a session."""
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         return ServoRegisters(self.profile.name, now, {
             s.joint: ServoReading(s.id, s.model, s.registers) for s in self.found.values() if s.joint is not None})
@@ -164,7 +164,7 @@ def _describe_servo(bus: Bus, servo: int, number: int, joint: str | None, mounti
     try:
         registers = read_registers(bus, servo)
     except NoAnswerError as e:
-        raise BusError(f"answered once, then not any more: {e.said}", servo, joint) from None
+        raise BusError(f"answered once, then not any more: {e.cause}", servo, joint) from None
     angle = JointServo(bus.profile, mounting).angle(registers["present_position"])
     return FoundServo(servo, joint, number, name, registers, angle, registers["present_voltage"] / 10,
                       registers["present_temperature"], bus.alarms.get(servo, ()), mounting)

@@ -39,7 +39,8 @@ def read_packet(protocol: int, servo: int, address: int, count: int) -> list[int
 
 
 def parameters_of(protocol: int, answer: list[int]) -> bytes:
-    """As many as the answer's own length says: the SDK's readTxRx takes the checksum for data where there are fewer."""
+    """As many parameters as the answer's own length states: the SDK's readTxRx takes the checksum for data where there are
+    fewer."""
     if protocol == 1:
         return bytes(answer[5:answer[3] + 3])
     return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
@@ -132,6 +133,6 @@ SLOW_ANSWERS = 2e-3
 
 
 def echo_error() -> BusError:
-    """Of an adapter that hears itself."""
+    """The error of an adapter that hears its own transmissions."""
     return BusError("the adapter echoes its own transmissions, so that every ID seems to answer; use one that does not "
                     "(U2D2, USB2Dynamixel), or add --echo")

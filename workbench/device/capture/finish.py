@@ -120,7 +120,7 @@ def _tracks(frames: Mapping[int, Frame], names: Mapping[int, str], first: int, l
 
 
 def _clock(echoes: list[Echo], first: float) -> ServerClock:
-    """From the quarter of the echoes with the shortest round trips; a drift where they span `DRIFT_AFTER`."""
+    """The clock, from the quarter of the echoes with the shortest round trips; a drift where they span `DRIFT_AFTER`."""
     if not echoes:
         return ServerClock(math.nan, math.nan, 0.0)
     sent, received, server = np.array([(e.sent, e.received, e.server) for e in echoes]).T

@@ -85,7 +85,7 @@ class Frame:
 
 
 class _Buffer(PacketBuffer):  # type: ignore[misc]
-    """As natnet's, whose 8-byte integers are 4 bytes long on Windows."""
+    """The same buffer as natnet's, whose 8-byte integers are 4 bytes long on Windows."""
 
     def read_uint64(self) -> int:
         return int(self.read("<Q")[0])

@@ -14,6 +14,7 @@ from workbench.device.capture.link import Link
 from workbench.device.capture.packets import HIRES, OLDEST, BodyPose, BrokenPacketError, Message, ServerInfo, kind_of, packet
 from workbench.device.capture.stream import Counts, Stream
 from workbench.files import InputError
+from workbench.types import Progress
 
 RESTARTED = 10
 """Frames in a row that are of another stream: then Motive was restarted or plays back."""
@@ -112,7 +113,7 @@ class Recorder:
         """Ends Motive's own recording."""
         return self._command("StopRecording")
 
-    def listen(self, journal: Journal, until: Callable[[], bool], progress: Callable[[str, float | None], None] | None = None,
+    def listen(self, journal: Journal, until: Callable[[], bool], progress: Progress | None = None,
                seconds: float | None = None) -> Counts:
         """Records until `until()`, or so many seconds after the first frame; InputError where no frame comes at all.
 
@@ -132,7 +133,7 @@ class Recorder:
             self._stay_in_touch(now)
             self._check_silence(now - began, now - self._last_frame)
             if progress is not None:
-                progress(self._said(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
+                progress(self._describe_stage(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
         quiet = self.link.now() - self._last_frame
         if self.counts_received and not self.problem and quiet > self.options.trailing:
             self.problem = f"no frame came in the last {quiet:.1f} s of the recording"
@@ -145,13 +146,13 @@ class Recorder:
         for data in (packet(Message.NOTE, json.dumps(note).encode()), *self._descriptions):
             journal.packet(now, data)
 
-    def _said(self) -> str:
+    def _describe_stage(self) -> str:
         c = self.counts
         bodies = f"{self._tracked} of {len(self.names)} bodies"
         return f"recording, {c.received} frames, {c.lost} lost, {c.broken} broken, {bodies}"
 
     def _take(self, journal: Journal, arrival: float, data: bytes) -> None:
-        """One packet, whatever it holds."""
+        """Takes one packet, whatever it holds."""
         journal.packet(arrival, data)
         known, broken = len(self.names), self.counts.broken
         frame = self._stream.take(arrival, data)

@@ -118,7 +118,7 @@ class Stream:
             self._cut.add(number)
 
     def counts(self) -> Counts:
-        """As they stand now."""
+        """The counts so far."""
         span = self.last - self.first + 1 if self._seen else 0
         never_whole = sum(self.first < n < self.last for n in self._cut - self._seen)
         lost = max(span - len(self._seen) - never_whole - self._unnamed, 0)

@@ -10,13 +10,14 @@ from workbench.device.capture.finish import Capture, finish
 from workbench.device.capture.journal import Journal
 from workbench.device.capture.recorder import Recorder
 from workbench.files import InputError
+from workbench.types import Progress
 
 PATIENCE = 10.0
 """Time until the first frame must have arrived [s]: three times the recorder's own time-out for it."""
 
 
 def record_take(recorder: Recorder, take: Path, until: Callable[[], bool], seconds: float | None = None, motive_too: bool = True,
-                progress: Callable[[str, float | None], None] | None = None,
+                progress: Progress | None = None,
                 until_time: Callable[[], float | None] = lambda: None) -> Capture:
     """Records until `until()` or so many seconds [s], and has Motive record it too (`motive_too`): its own file lacks no frame
     that the network lost. until_time(): asked at the end, the time on this machine's monotonic clock [s]
@@ -37,9 +38,9 @@ def record_take(recorder: Recorder, take: Path, until: Callable[[], bool], secon
                     recorder.stop_recording()
     finally:
         recorder.link.close()
-    said = None if not motive_too else refusal or f"recorded as '{take.stem}'"
+    motive_state = None if not motive_too else refusal or f"recorded as '{take.stem}'"
     ended = recorder.problem or (f"Motive itself did not record: {refusal}" if refusal else "")
-    capture = finish(journal.path, take, ended, said, until_time())
+    capture = finish(journal.path, take, ended, motive_state, until_time())
     journal.path.unlink()
     return capture
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from workbench.device.controller.loader_profile import LoaderProfile
-from workbench.device.link import FrameReader, FrameType, StateMessage, frame, message
+from workbench.device.link import FrameReader, FrameType, StateMessage, decode_message, encode_frame
+from workbench.types import Progress, no_progress
 
 FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that back: RoboPlus Manager, 'Controller Firmware "
            "Management' (R+ Manager on newer systems), with the controller on USB; the loader itself cannot be overwritten.")
@@ -67,8 +68,8 @@ class Transcript:
 
     def note(self, who: str, what: bytes | str) -> None:
         """Bytes as Python writes them, at most the first 200."""
-        said = what if isinstance(what, str) else repr(what[:200])[1:] + (f" … {len(what)} bytes" if len(what) > 200 else "")
-        self.lines.append(f"{self.now() - self._began:9.3f} {who}: {said}")
+        text = what if isinstance(what, str) else repr(what[:200])[1:] + (f" … {len(what)} bytes" if len(what) > 200 else "")
+        self.lines.append(f"{self.now() - self._began:9.3f} {who}: {text}")
 
     @property
     def text(self) -> str:
@@ -80,7 +81,7 @@ class Loading:
     """One conversation: `run` has the image loaded and started, or raises LoadError. Progress hears (what, done)."""
 
     def __init__(self, line: Line, profile: LoaderProfile, transcript: Transcript,
-                 progress: Callable[[str, float | None], None] = lambda what, done: None) -> None:
+                 progress: Progress = no_progress) -> None:
         self._line, self._profile, self._transcript, self._progress = line, profile, transcript, progress
         self._state = UNTOUCHED
 
@@ -134,9 +135,9 @@ class Loading:
         return heard
 
     def _at_prompt(self, heard: bytes) -> bool:
-        """Its last line is a prompt and nothing else; echoes of our key may be mixed in."""
-        said = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
-        return said in self._profile.prompt
+        """Whether the last line received is a prompt and nothing else; echoes of our key may be mixed in."""
+        last_line = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
+        return last_line in self._profile.prompt
 
     def _load(self) -> None:
         """LOAD, once more where it was refused: the line may have garbled it. Refused, it erases nothing."""
@@ -162,7 +163,8 @@ class Loading:
             self._line.write(data[at:at + CHUNK])
 
     def _expect(self, texts: tuple[bytes, ...], seconds: float, when: str, refused: tuple[bytes, ...] = ()) -> bytes:
-        """Its output up to one of these texts, or of `refused`; LoadError at a failure, or if none of them comes."""
+        """What the loader sends up to one of these texts, or one of `refused`; LoadError at a failure, or if none of them
+        comes."""
         heard, waited = b"", 0.0
         while not any(text in heard for text in (*texts, *refused)):
             failed = [text for text in self._profile.failure if text in heard]
@@ -187,13 +189,13 @@ class Loading:
         self._progress("4 of 4: starting it", None)
         self._until_quiet()
         self._write(profile.keep + profile.line_end)
-        said = self._until_prompt(PROMPT_AGAIN)
-        if any(text in said for text in profile.refused):
+        answer = self._until_prompt(PROMPT_AGAIN)
+        if any(text in answer for text in profile.refused):
             self._transcript.note("we note", f"{profile.keep.decode()} is unknown to it: it may wait for commands after a reset")
         self._fresh_prompt()
         self._write(profile.start + profile.line_end)
         for again in (False, True):
-            found = self._first_word(b"" if not again else frame(FrameType.ASK))
+            found = self._first_word(b"" if not again else encode_frame(FrameType.ASK))
             if found is not None:
                 return found
             self._reopen()
@@ -205,9 +207,9 @@ class Loading:
             if ask:
                 self._write(ask)
             for got in reader.feed(self._read(0.1)):
-                said = message(got)
-                if isinstance(said, StateMessage):
-                    return said
+                content = decode_message(got)
+                if isinstance(content, StateMessage):
+                    return content
             waited += 0.1
         return None
 
@@ -216,7 +218,7 @@ class Loading:
         self._line.reopen()
 
     def _until_quiet(self) -> bytes:
-        """Its output until it has been silent for a while."""
+        """What the loader sends until it has been silent for a while."""
         heard = new = self._collect(QUIET)
         while new:
             new = self._collect(QUIET)

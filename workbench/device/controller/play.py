@@ -18,14 +18,15 @@ from workbench.device.link import (
     LogMessage,
     Message,
     StateMessage,
-    frame,
+    decode_message,
+    encode_frame,
     log_bytes,
-    message,
     upload_frames,
 )
 from workbench.device.tables.table_file import TableFile, encode_table
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
+from workbench.types import Progress
 
 ANSWER = 1.5
 """Until an order is answered, and a table of 4 kB checked [s]: the upload itself takes 0.7 s at 57,600 bit/s."""
@@ -69,7 +70,7 @@ class StopAskedError(Exception):
 
 
 class NothingPlayedError(BusError):
-    """It was stopped before it played, and released; `reason` as `stop` said it."""
+    """Stopped before it played, and released. reason: as given by `stop`."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -91,9 +92,9 @@ class Controller:
         return float(self._port.getCurrentTime()) / 1000
 
     def state(self) -> StateMessage:
-        """Its present state; BusError where nothing answers in its frames."""
+        """The controller's present state; BusError where nothing answers in its frames."""
         for _ in range(3):
-            self._send(frame(FrameType.ASK))
+            self._send(encode_frame(FrameType.ASK))
             found = self._wait(lambda m: isinstance(m, StateMessage), 0.5)
             if isinstance(found, StateMessage):
                 return found
@@ -105,7 +106,7 @@ class Controller:
         if state.state == ControllerState.PLAY:
             raise BusError("the robot plays; stop it first (1 on the remote, or START)")
         if state.state in (ControllerState.STILL, ControllerState.LIMP):
-            self._send(frame(FrameType.PLAY))
+            self._send(encode_frame(FrameType.PLAY))
         end = self.now() + TO_NEUTRAL
         while state.state != ControllerState.NEUTRAL:
             state = self._next_state(state, end)
@@ -119,7 +120,7 @@ class Controller:
             found = self._wait(lambda m: isinstance(m, StateMessage), min(1.0, end - self.now()))
             if isinstance(found, StateMessage):
                 return found
-            self._send(frame(FrameType.ASK))
+            self._send(encode_frame(FrameType.ASK))
         raise BusError(f"it did not come to neutral in {TO_NEUTRAL:g} s; it is at {state.state.name}: {state.reason}")
 
     def upload(self, table: TableFile) -> None:
@@ -137,7 +138,7 @@ class Controller:
     def start(self) -> float:
         """Has it play from neutral; returns when it began on its own clock [s]. BusError with its reason where it does not."""
         self._wait(lambda m: False, REST)
-        self._send(frame(FrameType.PLAY))
+        self._send(encode_frame(FrameType.PLAY))
         began = self._wait(_on_the_way, ANSWER)
         if isinstance(began, StateMessage) and began.state == ControllerState.RAMP:  # the first pose is too far for its speed
             began = self._wait(_plays_or_gave_up, TO_NEUTRAL)
@@ -146,15 +147,15 @@ class Controller:
             raise BusError("it was commanded to play, and does not" + why)
         return began.time
 
-    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
+    def play(self, seconds: float, progress: Progress) -> tuple[float, str]:
         """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
         began = self.start()
         end = self.now() + seconds
         while True:
-            left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
+            left = self._wait(_has_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
             if left is not None:
-                said = left if isinstance(left, StateMessage) else self.state()
-                return began, "" if said.reason == ENDED else _reason(said)
+                final = left if isinstance(left, StateMessage) else self.state()
+                return began, "" if final.reason == ENDED else _reason(final)
             if self.now() >= end + SPARE:
                 return began, f"it still plays {SPARE:g} s after its end"
             if self.now() - self.heard[-1][0] > SILENT:
@@ -165,7 +166,7 @@ class Controller:
         """Sends a stop if it moves, and waits until it reaches neutral; returns "", or the reason why it did not."""
         end, state = self.now() + TO_NEUTRAL, self.state()
         if state.state in (ControllerState.CHECK, ControllerState.RAMP, ControllerState.PLAY):
-            self._send(frame(FrameType.STOP))
+            self._send(encode_frame(FrameType.STOP))
         while state.state not in (ControllerState.NEUTRAL, ControllerState.LIMP, ControllerState.STILL):
             state = self._next_state(state, end)
         return "" if state.state == ControllerState.NEUTRAL else _reason(state)
@@ -174,15 +175,15 @@ class Controller:
         """Torque off, whatever it is at and whatever is asked meanwhile; whether it said so."""
         self._stop = lambda: ""
         for _ in range(3):
-            self._send(frame(FrameType.RELEASE))
+            self._send(encode_frame(FrameType.RELEASE))
             if self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.LIMP, 0.5) is not None:
                 return True
         return False
 
     def began(self) -> float | None:
         """When it last began to play [s of its own clock], None where it never did."""
-        told = [m for _, m in self.heard if isinstance(m, StateMessage) and m.state == ControllerState.PLAY]
-        return told[-1].time if told else None
+        playing = [m for _, m in self.heard if isinstance(m, StateMessage) and m.state == ControllerState.PLAY]
+        return playing[-1].time if playing else None
 
     def clock_offset(self) -> float:
         """The computer's clock less the controller's [s]: the soonest arrival of a round, less what its bytes take."""
@@ -211,17 +212,17 @@ class Controller:
                 self._port.pause(0.001)
             hit = None
             for got in self._reader.feed(data):
-                said = message(got)
-                if said is not None:
-                    self.heard.append((self.now(), said))
-                    hit = hit or (said if wanted(said) else None)
+                content = decode_message(got)
+                if content is not None:
+                    self.heard.append((self.now(), content))
+                    hit = hit or (content if wanted(content) else None)
             if hit is not None:
                 return hit
         return None
 
 
 def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, profile: ServoProfile, stop: Callable[[], str],
-                       progress: Callable[[str, float | None], None] | None = None) -> ControllerRun:
+                       progress: Progress | None = None) -> ControllerRun:
     """Upload, neutral, play, release, and the joint log of it. seconds: how long the table plays with its cycles.
 
     BusError in one line where the controller is not there, refuses the table, does not get to neutral, or was stopped before it
@@ -249,7 +250,7 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
 
 
 def _perform(controller: Controller, table: TableFile, seconds: float,
-             tell: Callable[[str, float | None], None]) -> tuple[float | None, str]:
+             tell: Progress) -> tuple[float | None, str]:
     """Upload, neutral, play, neutral. The table goes first: one that is refused moves nothing. When it began (None: it did not),
     and why it ended early."""
     began, stopped = None, ""
@@ -276,16 +277,16 @@ def _let_go(controller: Controller) -> bool:
         return False
 
 
-def _left_play(said: Message) -> bool:
-    return isinstance(said, StateMessage | LogMessage) and said.state != ControllerState.PLAY
+def _has_left_play(m: Message) -> bool:
+    return isinstance(m, StateMessage | LogMessage) and m.state != ControllerState.PLAY
 
 
-def _on_the_way(said: Message) -> bool:
-    return isinstance(said, StateMessage) and said.state in (ControllerState.PLAY, ControllerState.RAMP)
+def _on_the_way(m: Message) -> bool:
+    return isinstance(m, StateMessage) and m.state in (ControllerState.PLAY, ControllerState.RAMP)
 
 
-def _plays_or_gave_up(said: Message) -> bool:
-    return isinstance(said, StateMessage) and said.state != ControllerState.RAMP
+def _plays_or_gave_up(m: Message) -> bool:
+    return isinstance(m, StateMessage) and m.state != ControllerState.RAMP
 
 
 def _reason(state: StateMessage) -> str:

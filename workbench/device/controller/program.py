@@ -30,7 +30,7 @@ class Program:
 
     @property
     def sha256(self) -> str:
-        """Of the image: equal programs built by the same compiler have the same."""
+        """Digest of the image: the same program, built by the same compiler, has the same."""
         return hashlib.sha256(self.image).hexdigest()
 
 

@@ -43,10 +43,10 @@ class CycleController(Controller):
 
     def taken(self) -> bool:
         """Whether the last table sent has been received and checked; BusError where it was refused."""
-        for _, said in self.heard[self._answered:]:
-            if isinstance(said, AnswerMessage) and not said.well:
-                raise BusError(f"the table is refused: {said.result}")
-            if isinstance(said, AnswerMessage) and said.type == FrameType.END:
+        for _, m in self.heard[self._answered:]:
+            if isinstance(m, AnswerMessage) and not m.well:
+                raise BusError(f"the table is refused: {m.result}")
+            if isinstance(m, AnswerMessage) and m.type == FrameType.END:
                 return True
         return False
 
@@ -54,18 +54,18 @@ class CycleController(Controller):
         """Hears it until a time on the computer's clock [s]. LeftPlayError where it stopped walking or refused to change tables,
         BusError where it fell silent."""
         while self.now() < until:
-            said = self._wait(_news, until - self.now())
-            if isinstance(said, StateMessage) and said.state == ControllerState.PLAY:
-                raise LeftPlayError(f"a table was not played: {said.table_fault}")
-            if said is not None:
-                state = said if isinstance(said, StateMessage) else self.state()
+            m = self._wait(_news, until - self.now())
+            if isinstance(m, StateMessage) and m.state == ControllerState.PLAY:
+                raise LeftPlayError(f"a table was not played: {m.table_fault}")
+            if m is not None:
+                state = m if isinstance(m, StateMessage) else self.state()
                 raise LeftPlayError(state.reason + (f" (servo {state.servo})" if state.servo is not None else ""))
             if self.now() - self.heard[-1][0] > SILENT:
                 raise BusError("the controller fell silent; it stops after its cycles: hold START for 1.5 s, or switch it off")
 
 
-def _news(said: Message) -> bool:
-    """That it does not walk any more, or that the next table's first pose was out of reach."""
-    if isinstance(said, StateMessage):
-        return said.state != ControllerState.PLAY or said.table_fault != "none"
-    return isinstance(said, LogMessage) and said.state != ControllerState.PLAY
+def _news(m: Message) -> bool:
+    """Whether a message reports that the controller no longer walks, or that the next table's first pose was out of reach."""
+    if isinstance(m, StateMessage):
+        return m.state != ControllerState.PLAY or m.table_fault != "none"
+    return isinstance(m, LogMessage) and m.state != ControllerState.PLAY

@@ -21,12 +21,12 @@ class PlayJournal(AppendedFile):
         self.write(kind=KIND, **head)
 
     def write(self, **entry: Any) -> None:
-        """One line."""
+        """Writes one line."""
         self.append((json.dumps(entry) + "\n").encode())
 
 
 def read_play_journal(path: str | Path) -> Iterator[dict[str, Any]]:
-    """Its lines, the head first; one that is cut at the end is left out. InputError where the file is none."""
+    """The journal's lines, the head first; one that is cut at the end is left out. InputError where the file is none."""
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as e:

@@ -60,7 +60,7 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     if not content.sent or not all(len(content.read.get(j, ())) > 1 for j in content.joints):
         raise NothingPlayedError(journal, "no goals, or a joint that was not read twice; expected a motion that was played")
     start = _rest_begins(content)
-    readings = _trusted({j: np.array(content.read[j], dtype=float) for j in content.joints})
+    readings = _drop_late_readings({j: np.array(content.read[j], dtype=float) for j in content.joints})
     end = max(rows[-1, 0] for rows in readings.values())
     readings = {j: rows[rows[:, 0] < content.doubted.get(j, math.inf)] for j, rows in readings.items()}
     poses = np.array([t for t, _ in content.sent if t >= start])
@@ -76,10 +76,10 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     for joint in content.joints:
         rows = readings[joint]
         channels[f"position.{joint}"] = _position(time, rows[:, 0], rows[:, 1], moved)
-        told = rows[np.isfinite(rows[:, 2])]
-        channels[f"temperature.{joint}"] = _slow(time, told[:, 0], told[:, 3])
-        channels[f"enabled.{joint}"] = _enabled(time, joint, content)
-        volts.append(_slow(time, told[:, 0], told[:, 2]))
+        measured = rows[np.isfinite(rows[:, 2])]
+        channels[f"temperature.{joint}"] = _slow(time, measured[:, 0], measured[:, 3])
+        channels[f"enabled.{joint}"] = _torque_enabled(time, joint, content)
+        volts.append(_slow(time, measured[:, 0], measured[:, 2]))
     known = np.isfinite(volts).any(axis=0)
     channels["voltage"] = np.where(known, np.nansum(volts, axis=0) / np.maximum(np.isfinite(volts).sum(axis=0), 1), np.nan)
     return write_joint_log(log, time - start, channels)
@@ -100,7 +100,7 @@ def _rows(start: float, poses: Array, read: Array) -> Array:
     return rows[np.append(True, np.diff(rows) > 1e-5)]
 
 
-def _trusted(readings: Mapping[str, Array]) -> dict[str, Array]:
+def _drop_late_readings(readings: Mapping[str, Array]) -> dict[str, Array]:
     """Readings without those whose answer was so late that the question may not have gone out when it should have; the first and
     the last of a joint stay."""
     took = np.concatenate([rows[:, 4] for rows in readings.values()])
@@ -178,7 +178,7 @@ def _rest_begins(content: _Content) -> float:
     return content.rests[0] if content.rests else content.sent[0][0]
 
 
-def _enabled(time: Array, joint: str, content: _Content) -> Array:
+def _torque_enabled(time: Array, joint: str, content: _Content) -> Array:
     changes = [(t, on[joint]) for t, on in content.torque if joint in on]
     at = np.searchsorted([t for t, _ in changes], time, side="right") - 1
     return np.array([float(changes[k][1]) if k >= 0 else 0.0 for k in at.tolist()])

@@ -15,6 +15,7 @@ from workbench.device.play.plan import reading_plan
 from workbench.device.play.player import play
 from workbench.files import InputError
 from workbench.motion.commands import Commands
+from workbench.types import Progress
 
 
 def preflight(found: Survey) -> None:
@@ -26,7 +27,7 @@ def preflight(found: Survey) -> None:
 
 
 def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callable[[], str], options: PlayOptions | None = None,
-            progress: Callable[[str, float | None], None] | None = None) -> Played:
+            progress: Progress | None = None) -> Played:
     """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds the journal, which
     is deleted when the log is on the disk. BusError, or InputError, where it could not be played to a regular end; where it
     was stopped before there was anything to log, `log_problem` gives the reason."""

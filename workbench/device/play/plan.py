@@ -32,9 +32,9 @@ class ReadingPlan:
     warning: str
 
 
-def reading_plan(bus: Bus, servos: int, commands: Commands, watching: WatchOptions | None = None) -> ReadingPlan:
-    """From the adapter's latency, as it was measured, the bytes, and the time that poses leave. InputError where the watch would
-    be blind for so long that it would have to end the motion."""
+def reading_plan(bus: Bus, servos: int, commands: Commands) -> ReadingPlan:
+    """How often each servo can be read, from the adapter's measured latency, the length of a reading in bytes and the time
+    between poses. InputError where that is so seldom that the watch would have to end the motion."""
     byte, profile = float(bus.port.tx_time_per_byte) / 1000, bus.profile
     kind = bus.group_kind
     if kind:
@@ -49,7 +49,7 @@ def reading_plan(bus: Bus, servos: int, commands: Commands, watching: WatchOptio
     read = np.concatenate([t + reading * np.arange(1, n + 1) for t, n in zip(commands.times.tolist(), fits.tolist())])
     whole = np.concatenate([[commands.times[0]], read, [commands.times[len(fits) - 1] + free[len(fits) - 1]]])
     longest = float(np.max(whole[needed:] - whole[:-needed])) if len(whole) > needed else float(whole[-1] - whole[0])
-    cycle, limit = needed * reading, (watching or WatchOptions()).silent
+    cycle, limit = needed * reading, WatchOptions().silent
     why = slow_adapter(bus.latency) or f"one reading takes {1000 * reading:.1f} ms"
     if longest > limit:
         raise InputError(None, f"between the poses each servo would be read only every {longest:.2f} s, and has to be every "

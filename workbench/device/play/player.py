@@ -70,10 +70,10 @@ class _Performance:
                 self._rest()
                 self._poses(commands)
                 self._ramp(neutral, "back to neutral")
-                self._arrived(neutral)
+                self._wait_for_arrival(neutral)
                 self._rest()
             except StopError as e:
-                stopped, released = self._stopped(e.reaction, neutral), True
+                stopped, released = self._carry_out(e.reaction, neutral), True
             bus.options = kept
             if released and self._energised:
                 unknown = rig.release()
@@ -84,7 +84,7 @@ class _Performance:
         except BaseException as e:
             rig.journal.write(t=_time(bus), stopped=str(e) or type(e).__name__)
             if self._energised and not self._let_go() and isinstance(e, BusError):
-                raise type(e)(f"{e.said}; {HOLDING}", e.servo, e.joint, e.register) from None
+                raise type(e)(f"{e.cause}; {HOLDING}", e.servo, e.joint, e.register) from None
             raise
         finally:
             bus.options = kept
@@ -119,7 +119,7 @@ class _Performance:
     def _to_neutral(self, neutral: Mapping[str, float]) -> None:
         """The first way, with little torque; then with as much as the motion gets, so that the joints are where it begins."""
         self._ramp(neutral, "to neutral")
-        self._arrived(neutral)
+        self._wait_for_arrival(neutral)
         self.rig.limit_torque(self.options.torque)
         self._seat(neutral)
 
@@ -131,7 +131,7 @@ class _Performance:
                                self.rig.ids[joint], joint)
 
     def _ramp(self, target: Mapping[str, float], what: str) -> None:
-        """All joints to a pose, smoothly, the farthest at the ramp's speed."""
+        """Moves all joints to a pose, smoothly, the farthest at the ramp's speed."""
         start, options = dict(self.goals), self.options
         duration = max(max(abs(target[j] - start[j]) for j in start) / options.ramp_speed, 0.3)
         bus, last, gone = self.rig.bus, self.rig.bus.now(), 0.0
@@ -148,7 +148,7 @@ class _Performance:
             gone += min(bus.now() - last, 2 * options.step)  # a computer that stood still goes on where it was
             last = bus.now()
 
-    def _arrived(self, target: Mapping[str, float]) -> None:
+    def _wait_for_arrival(self, target: Mapping[str, float]) -> None:
         """Waits until every joint is near its goal; a joint that never is ends it: something holds it, or it has no strength."""
         bus, end = self.rig.bus, self.rig.bus.now() + self.options.within
         while True:
@@ -191,7 +191,8 @@ class _Performance:
         self._read_until(self.rig.bus.now() + self.options.rest)
 
     def _poses(self, commands: Commands) -> None:
-        """Each pose at its time after the first, however late the one before it was; its time is that of its packet's end."""
+        """Sends each pose at its time after the first, however late the one before it was; its time is that of its packet's
+        end."""
         rig, bus = self.rig, self.rig.bus
         self.started, self.read_before = bus.now(), Counter(self.rig.readings)
         packet, self.missed_before = 0.0, rig.missed
@@ -226,7 +227,7 @@ class _Performance:
             self._asked = asked
             raise StopError(Reaction(how, asked))
 
-    def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
+    def _carry_out(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
         """Carries out the reaction and returns its reason, with any that came on the way to neutral; there, only reactions that
         release, or a second signal, count."""
         rig = self.rig
@@ -257,7 +258,7 @@ class _Performance:
             self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
 
     def _let_go(self) -> bool:
-        """On a bus that may be gone; whether all servos have confirmed it."""
+        """Releases all servos of a bus that may be gone; whether all have confirmed it."""
         try:
             unknown = self.rig.release()
             self.rig.limit_torque(1)

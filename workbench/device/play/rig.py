@@ -139,7 +139,7 @@ class Rig:
             self.repaired += 1
 
     def torque(self, on: bool) -> None:
-        """Of all joints at once, and it is read back."""
+        """Switches the torque of all joints at once, and reads it back."""
         self.bus.sync_write({servo: {"torque_enable": int(on)} for servo in self.ids.values()})
         self.bus.pause(0.005)
         for joint, servo in self.ids.items():
@@ -218,7 +218,7 @@ class Rig:
         return STATE if turn % 2 else (GOAL, *POSITION)
 
     def _read_all(self, names: tuple[str, ...]) -> None:
-        """One question to all; whoever did not answer is asked alone first next time: it may keep others silent."""
+        """Asks all servos in one packet; whoever did not answer is asked alone first next time: it may keep others silent."""
         bus = self.bus
         if self._suspects:
             suspect = self._suspects.pop(0)
@@ -239,7 +239,7 @@ class Rig:
             self._take(joint, values, begun + k * each, bus.now() - begun)
 
     def doubt(self) -> None:
-        """Where the watch doubts a servo, the journal says from when on its readings may be another servo's."""
+        """Notes in the journal where the watch doubts a servo: from when on its readings may be another servo's."""
         since = self.bus.now() - self.watch.options.silent - DOUBTED
         self.journal.write(t=self.bus.now(), since=since, doubted=[j for j, i in self.ids.items() if i == self.watch.doubted])
 

@@ -71,7 +71,7 @@ class Watch:
         self.reaction: Reaction | None = None
 
     def begin(self, time: float) -> None:
-        """From this time [s] on every servo counts as unheard until it answers."""
+        """Starts the watch: from this time [s] on, every servo counts as unheard until it answers."""
         self._answered = dict.fromkeys(self._joints, time)
         self._failed.clear()
         self._questions.clear()
@@ -120,7 +120,7 @@ class Watch:
                         "its bus watchdog stopped it: it heard nothing for too long")
 
     def silent(self, servo: int, time: float) -> None:
-        """It was asked and did not answer, or not so that it could be read, at a time [s]."""
+        """A servo did not answer, or not readably, at a time [s]."""
         self._answered.setdefault(servo, time)
         self._failed[servo] += 1
         self._count(servo, time, False, False)
@@ -131,8 +131,8 @@ class Watch:
         self._count(servo, time, False, True)
 
     def _count(self, servo: int, time: float, good: bool, heard: bool) -> None:
-        """Of its latest questions, whether too many had no good answer; one that has fallen silent for good is left to `check`,
-        and so is a single gap, as a restart or a stall leaves."""
+        """Counts a servo's latest questions and reacts where too many had no good answer; a servo that has fallen silent for good
+        is left to `check`, and so is a single gap, as a restart or a stall leaves."""
         options, latest = self.options, self._questions[servo]
         latest.append((time, good, heard))
         while latest[0][0] <= time - options.silent:

@@ -84,37 +84,37 @@ class Answers:
     def take(self, joint: str, answer: str, joints: Iterable[str]) -> None:
         """"" or yes: this one, the positive way; `-`: this one, the other way; a joint's name, perhaps with `-` behind it: that
         one. InputError for anything else."""
-        said = answer.strip()
-        other = said.removesuffix("-").strip()
+        name = answer.strip()
+        other = name.removesuffix("-").strip()
         if other.lower() in ("", "y", "yes"):
             other = joint
         if other not in joints:
             raise InputError(None, f"'{answer.strip()}': expected Enter, -, or the joint that moved: {' '.join(joints)}")
         self.moved[joint] = other
-        if said.endswith("-"):
+        if name.endswith("-"):
             self.reversed.append(other)
 
     def findings(self, ids: Mapping[str, int]) -> list[str]:
         """Errors of bus IDs and directions, a line each."""
-        out = [f"servo {ids[told]} is {seen}, not {told}: bus_ids should say {seen}: {ids[told]}"
-               for told, seen in self.moved.items() if told != seen]
+        out = [f"servo {ids[commanded]} is {seen}, not {commanded}: bus_ids should say {seen}: {ids[commanded]}"
+               for commanded, seen in self.moved.items() if commanded != seen]
         seen = list(self.moved.values())
         out += [f"joint {joint} moved for several servos: look again" for joint in sorted({j for j in seen if seen.count(j) > 1})]
         out += [f"joint {joint} turns the other way than in the model" for joint in self.reversed]
         return out
 
-    def corrected(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
+    def corrections(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
         """The keys `bus_ids` and `direction` of a `robot` section that agree with the observations; a key that is right already
         is left out. InputError where two servos were seen to move one joint."""
         seen = list(self.moved.values())
         if len(set(seen)) < len(seen):
             raise InputError(None, "one joint moved for several servos; wiggle them again")
-        new = {joint: ids[told] for told, joint in self.moved.items()}
+        new = {joint: ids[commanded] for commanded, joint in self.moved.items()}
         unseen = {joint: i for joint, i in ids.items() if joint not in new and i not in new.values()}
         signs = {}
         for joint in ids:
-            told = next((t for t, s in self.moved.items() if s == joint), joint)
-            sign = mountings.get(told, Mounting()).direction * (-1 if joint in self.reversed else 1)
+            commanded = next((t for t, s in self.moved.items() if s == joint), joint)
+            sign = mountings.get(commanded, Mounting()).direction * (-1 if joint in self.reversed else 1)
             if sign != 1:
                 signs[joint] = sign
         old = {joint: m.direction for joint, m in mountings.items() if m.direction != 1}

@@ -13,9 +13,11 @@ import numpy as np
 
 from workbench.device.tables.mounted import in_servo_counts, zeros
 from workbench.files import InputError
+from workbench.files.reading import read_bytes
 from workbench.motion import PoseTable
 from workbench.robot import BUS_IDS, RobotModel, bus_ids
 from workbench.robot.mounting import Mounting
+from workbench.robot.names import HIGHEST_BUS_ID
 from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_units import AX12A
 
@@ -23,8 +25,11 @@ MAGIC = b"WBTB"
 VERSION, SECTIONS_VERSION = 1, 2
 """A table with a start or a stop says how many poses they have, behind the same head."""
 STOPS = 1
+"""Flag of a table that ends after its cycles; without it the table repeats."""
 AX12A_NUMBER = 12
+"""The AX-12A's model number in its register."""
 CENTRE, LARGEST = AX12A.centre, AX12A.highest
+"""Counts of angle zero and of the largest goal and speed."""
 MOST_JOINTS = 26
 """A Sync Write of goal and speed stays below the AX-12A's receive buffer of 143 bytes."""
 MOST_BYTES = 4096
@@ -104,12 +109,13 @@ def table_file(table: PoseTable, model: RobotModel, cycles: int = 0, stops: bool
 
 
 def unplayable(table: PoseTable) -> str:
-    """Why the controller's program cannot play a table, "" where it can: another servo family, or more poses than fit."""
+    """Why the controller's program cannot play a table (another servo family, or more poses than fit); "" where it can."""
     return other_family(table) or too_long(len(table.joints), len(table))
 
 
 def other_family(table: PoseTable) -> str:
-    """Which servo the controller's program does not speak to, "" where all are of the AX-12A's family, as it needs them."""
+    """A line about the first servo that is not of the AX-12A's family, the only one that the controller's program knows; "" if
+    none."""
     others = [(j, u.family) for j, u in zip(table.joints, table.units) if u != AX12A]
     if not others:
         return ""
@@ -118,7 +124,7 @@ def other_family(table: PoseTable) -> str:
 
 
 def too_long(joints: int, poses: int) -> str:
-    """Why so many poses of so many joints do not fit into the controller, "" where they do."""
+    """A line that says how many poses fit, if so many of so many joints do not fit into the controller; "" if they do."""
     size = table_bytes(joints, poses)
     if size <= MOST_BYTES:
         return ""
@@ -198,11 +204,7 @@ def decode_table(data: bytes, names: Mapping[int, str] | None = None, source: st
 
 def read_table_file(path: str | Path, names: Mapping[int, str] | None = None) -> TableFile:
     """Reads a binary table; InputError where it cannot be read or is none."""
-    try:
-        data = Path(path).read_bytes()
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
-    return decode_table(data, names, str(path))
+    return decode_table(read_bytes(path), names, str(path))
 
 
 def _joints(data: bytes, n: int, head: int, source: str) -> tuple[JointBounds, ...]:
@@ -210,8 +212,9 @@ def _joints(data: bytes, n: int, head: int, source: str) -> tuple[JointBounds, .
     for k in range(n):
         bus_id, zero, number, low, high, fastest, neutral = _JOINT.unpack_from(data, head + _JOINT.size * k)
         place = f"joint {k + 1}"
-        if bus_id > 253 or zero or bus_id in [j.bus_id for j in joints]:
-            raise InputError(source, f"{place}: bus ID {bus_id} is above 253, or there twice, or the byte after it is not 0")
+        if bus_id > HIGHEST_BUS_ID or zero or bus_id in [j.bus_id for j in joints]:
+            raise InputError(source, f"{place}: bus ID {bus_id} is above {HIGHEST_BUS_ID}, or there twice, "
+                                     "or the byte after it is not 0")
         if not low <= neutral <= high <= LARGEST or not 1 <= fastest <= LARGEST:
             raise InputError(source, f"{place}: bounds {low} to {high} about {neutral}, speeds up to {fastest}, make no sense")
         joints.append(JointBounds(bus_id, number, low, high, fastest, neutral))

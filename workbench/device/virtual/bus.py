@@ -80,7 +80,7 @@ class ServoBus:
         self._hosts.append(host)
 
     def add(self, servo: VirtualServo) -> None:
-        """Another servo on the chain."""
+        """Adds a servo to the chain."""
         self.servos.append(servo)
 
     def talk(self, talker: object, values: bytes, rate: int, starts: Sequence[int] | int) -> int:
@@ -196,13 +196,13 @@ class ServoBus:
             return
         there = [servo for servo in self.servos
                  if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key]
-        said = [(end, data) for servo in there if (told := servo.add_block(what, time, head, so_far)) for end, data in [told]]
-        if said:
-            end, data = max(said)
+        blocks = [(end, data) for servo in there if (block := servo.add_block(what, time, head, so_far)) for end, data in [block]]
+        if blocks:
+            end, data = max(blocks)
             self.clock.at(end, partial(self._one_packet, what, ids[1:], key, end, head, so_far + data))
 
     def _collide(self, one: Burst, two: Burst) -> None:
-        """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""
+        """Garbles bytes of two senders that overlap; the stop bit breaks."""
         k = one.done
         for i, end in enumerate(two.ends):
             start = end - two.byte

@@ -17,6 +17,8 @@ TICKS = 10_000_000
 """Ticks per second of the server's clock, as Windows counts them."""
 LATENCY = 4e-3
 """From mid-exposure to the frame on the network [s]."""
+DELAY = 0.2e-3
+"""Of a packet to or from the server [s], as on a local network."""
 _SENDER = struct.Struct("<256s4B4B")
 
 Pose = tuple[tuple[float, float, float], tuple[float, float, float, float], bool]
@@ -72,11 +74,11 @@ class VirtualMotive:
         return self._clock + (now - self.started) * self._ratio
 
     def mid_exposure(self, number: int) -> float:
-        """Of a frame, on the server's clock [s]."""
+        """Time of a frame's mid-exposure on the server's clock [s]."""
         return self.clock(self.started + (number - self.first_number) / self.rate)
 
     def answer(self, data: bytes, now: float) -> list[bytes]:
-        """Its answer to a packet at a time [s] of the caller's clock."""
+        """The server's answer to a packet at a time [s] of the caller's clock."""
         kind, size = struct.unpack_from("<HH", data)
         payload = data[4:4 + size]
         if kind == Message.CONNECT:
@@ -200,10 +202,10 @@ class VirtualMotive:
 
 
 class VirtualLink:
-    """An emulated server in this process; waiting costs virtual time only. delay: of each packet, either way [s]."""
+    """An emulated server in this process; waiting costs virtual time only."""
 
-    def __init__(self, server: VirtualMotive, delay: float = 0.2e-3) -> None:
-        self._server, self._delay, self._now = server, delay, server.started
+    def __init__(self, server: VirtualMotive) -> None:
+        self._server, self._now = server, server.started
         self._waiting: list[tuple[float, bytes]] = []
 
     @property
@@ -217,7 +219,7 @@ class VirtualLink:
 
     def send(self, data: bytes) -> None:
         """Sends a packet to the server; InputError where it cannot be reached."""
-        self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
+        self._waiting += [(self._now + 2 * DELAY, a) for a in self._server.answer(data, self._now + DELAY)]
 
     def subscribe(self, info: ServerInfo) -> None:
         """Nothing to join: the emulated server sends to this link."""
@@ -225,7 +227,7 @@ class VirtualLink:
     def receive(self, timeout: float) -> tuple[float, bytes] | None:
         """The next packet and when it came [s], None where none comes within `timeout` [s]."""
         end = self._now + timeout
-        self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
+        self._waiting += [(t + DELAY, data) for t, data in self._server.due(end - DELAY)]
         self._waiting.sort(key=lambda item: item[0])
         if not self._waiting or self._waiting[0][0] > end:
             self._now = end

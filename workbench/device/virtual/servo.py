@@ -160,8 +160,8 @@ class VirtualServo:
         self._answer(time, 0, bytes(self._table[address:address + count]), self.profile.answer_times[1], level=1)
 
     def answer_in_turn(self, what: bytes, time: int) -> int | None:
-        """Its answer when many were asked at once for `what`, address and count, when it is its turn. When its last byte is out,
-        None where it is silent."""
+        """The servo's answer, in its turn, to a question for `what` (address and count) that went to many. Returns when its last
+        byte is out; None where it is silent."""
         address, count = what
         if not self.powered or self.mute or time < self._deaf_until or address + count > self.profile.size:
             return None

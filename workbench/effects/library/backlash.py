@@ -1,4 +1,4 @@
-"""Free play in a servo's gear: the link turns a little while the servo stands."""
+"""Free play in a servo's gear: the link can turn a little while the servo does not move."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class Backlash(Effect):
-    """Free play in a servo's gear: the link turns a little while the servo stands.
+    """Free play in a servo's gear: the link can turn a little while the servo does not move.
 
-    The sensor and the reflected inertia are on the servo's side. The play is half to each side of the servo's angle, ends hard
-    and without bounce, and nearly free of friction.
+    The sensor and the reflected inertia are on the servo's side. The play is centred on the servo's angle, has hard ends without
+    bounce, and is nearly free of friction.
     """
 
     name = "backlash"
@@ -20,7 +20,7 @@ class Backlash(Effect):
     under_load = True
     needs_steady_load = True
     free_play = "gap"
-    # measured on hobby servos: 0.6 to 1.3 deg; worn ones are said to have "at least 2"
+    # measured on hobby servos: 0.6 to 1.3 deg; worn ones are reported to have "at least 2"
     parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE, seldom_beyond=4.0),)
 
     def sentence(self, spec: EffectSpec) -> str:

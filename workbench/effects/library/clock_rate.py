@@ -21,7 +21,7 @@ class ClockRate(Effect):
     parameters = (Parameter("ratio", "1", 0.5, 2.0, 1.01, seldom_beyond=1.015),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"A second of the commands takes {spec.parameters['ratio']:.4f} s of the recording."
+        return f"One second of the commands takes {spec.parameters['ratio']:.4f} s in the recording."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)

@@ -1,4 +1,4 @@
-"""A link's centre of mass is not where the model has it."""
+"""A link's centre of mass differs from the model's."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_source import link_sizes
 
 SHARE = 0.5
-"""Share of a link's size by which a search may move its centre of mass: beyond it, one in the middle leaves the link."""
+"""Fraction of a link's size by which a search may move its centre of mass: one that is in the middle stays within the link."""
 
 
 class ComShift(Effect):
-    """A link's centre of mass is not where the model has it."""
+    """A link's centre of mass differs from the model's."""
 
     name = "com_shift"
     layer = "inertia"
@@ -29,8 +29,8 @@ class ComShift(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         x, y, z = spec.parameters["offset"]  # type: ignore[misc]
-        return (f"The centre of mass of {', '.join(spec.where)} is ({1000 * x:.1f}, {1000 * y:.1f}, {1000 * z:.1f}) mm off the "
-                "model's, in its frame.")
+        return (f"The centre of mass of {', '.join(spec.where)} is displaced by ({1000 * x:.1f}, {1000 * y:.1f}, "
+                f"{1000 * z:.1f}) mm in the link's frame.")
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

@@ -19,7 +19,7 @@ class CommandDelay(Effect):
     places = ("joint", "robot",)
     family = "timing"
     like_a_late_start = True
-    # two rounds of a USB adapter whose latency timer is at its default of 16 ms, beside the servo's own
+    # two rounds of a USB adapter whose latency timer is at its default of 16 ms, plus the servo's own delay
     parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0), seldom_beyond=0.04),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -1,4 +1,4 @@
-"""A servo that smooths the goal it is sent."""
+"""A servo filters its goals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class CommandFilter(ServoConstant):
-    """A servo follows its goal through a first-order low-pass filter, as one that measures the width of pulses does; the time
+    """A servo follows its goal through a first-order low-pass filter, as servos do that measure the width of pulses; the time
     constant is added to the nominal one."""
 
     name = "command_filter"

@@ -1,4 +1,4 @@
-"""A servo rests within a wider margin around its goal than nominal."""
+"""A servo stops within a wider margin around its goal than nominal."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from workbench.robot import EffectSpec
 
 
 class DeadBand(ServoConstant):
-    """A servo rests within a wider margin around its goal than nominal."""
+    """A servo stops within a wider margin around its goal than nominal."""
 
     name = "dead_band"
     field = "margin"
-    # seven counts of an AX-12A, 23 of a servo of 4096: a register that somebody set, no wear
+    # seven counts of an AX-12A, 23 of a servo of 4096: a register setting, not wear
     parameters = (Parameter("margin", "deg", 0.0, 15.0, 0.5, si=DEGREE, seldom_beyond=2.0),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -1,4 +1,4 @@
-"""Poses are missed by a servo, by chance."""
+"""A servo misses poses at random."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
 
 SEED = 0
-"""Which poses are missed differs from take to take; a simulation shows one draw, always the same."""
+"""The missed poses differ from take to take; a simulation always uses the same random draw."""
 
 
 class DroppedCommand(Effect):
-    """Poses are missed by a servo, by chance."""
+    """A servo misses poses at random."""
 
     name = "dropped_command"
     layer = "timing"

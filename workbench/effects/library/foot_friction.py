@@ -1,4 +1,4 @@
-"""One foot slides more or less easily than the others."""
+"""One foot has more or less friction on the floor than the others."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from workbench.robot import EffectSpec
 
 
 class FootFriction(FloorFriction):
-    """One foot slides more or less easily than the others."""
+    """One foot has more or less friction on the floor than the others."""
 
     name = "foot_friction"
     places = ("foot",)
     parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"Friction of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."
+        return f"The friction coefficient of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."
 
     def foot_friction(self, values: Mapping[str, float]) -> float:
         return values["friction"]

@@ -1,4 +1,4 @@
-"""A gear that turns harder one way than the other."""
+"""A gear with more friction in one direction than in the other."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Instant, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
 class _Asymmetric(ServoTerm):
-    """share: (n,) by which friction is more forwards, and less backwards."""
+    """share: (n,) fraction by which friction is higher forwards and lower backwards."""
 
     share: Array
 
@@ -31,8 +30,8 @@ class _Asymmetric(ServoTerm):
 
 
 class FrictionAsymmetry(Effect):
-    """A gear that turns harder one way than the other: all Coulomb friction, whatever it depends on, is `ratio` times as much to
-    positive angles as to negative ones, while the mean of both stays."""
+    """A gear with more friction in one direction than in the other: all Coulomb friction, whatever it depends on, is `ratio`
+    times as high towards positive angles as towards negative ones; the mean of both is unchanged."""
 
     name = "friction_asymmetry"
     layer = "actuator"
@@ -43,13 +42,13 @@ class FrictionAsymmetry(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         ratio = scalar(spec, "ratio")
-        way, more = ("positive", ratio) if ratio >= 1 else ("negative", 1 / ratio)
-        return f"{', '.join(spec.where)} has {more:.2f} times as much dry friction towards {way} angles as the other way."
+        way, other, more = ("positive", "negative", ratio) if ratio >= 1 else ("negative", "positive", 1 / ratio)
+        return f"{', '.join(spec.where)} has {more:.2f} times as much dry friction towards {way} angles as towards {other} ones."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         ratio = values["ratio"]
         return _Asymmetric(here.astype(float) * (ratio - 1.0) / (ratio + 1.0))
 

@@ -1,4 +1,4 @@
-"""A servo that moves its own goal at a limited speed."""
+"""A servo moves its internal reference to the goal at a limited speed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class GoalRamp(ServoConstant):
-    """A servo moves its own goal to the one that it was sent at no more than `speed`, or at the moving speed or the nominal ramp
-    where these are slower. Goals that move slower than that show nothing."""
+    """A servo moves its internal reference to the goal at no more than `speed`, or at the moving speed or the nominal ramp if
+    these are slower. Goals that move more slowly than that are not affected."""
 
     name = "goal_ramp"
     field = "ramp"
@@ -22,7 +22,7 @@ class GoalRamp(ServoConstant):
     parameters = (Parameter("speed", "deg/s", 1.0, 1e5, 300.0, si=DEGREE),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} moves its goal at no more than {scalar(spec, 'speed'):.0f} deg/s."
+        return f"{', '.join(spec.where)} moves its internal reference at no more than {scalar(spec, 'speed'):.0f} deg/s."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)

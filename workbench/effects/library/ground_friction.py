@@ -1,4 +1,4 @@
-"""All feet slide more or less easily on this floor."""
+"""All feet have more or less friction on this floor than nominal."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from workbench.robot import EffectSpec, Ground
 
 
 class GroundFriction(FloorFriction):
-    """All feet slide more or less easily on this floor."""
+    """All feet have more or less friction on this floor than nominal."""
 
     name = "ground_friction"
     places = ("robot",)
     parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"Friction of feet and floor is {spec.parameters['friction']:.2f}."
+        return f"The friction coefficient between feet and floor is {spec.parameters['friction']:.2f}."
 
     def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
         return replace(ground, friction=values["friction"])

@@ -1,4 +1,4 @@
-"""The floor is not level: gravity leans forward or left in its frame; a stand stands on the same floor."""
+"""The floor is not level: in its frame gravity is tilted forward or left; a stand is on the same floor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.types import Array
 
 
 class GroundTilt(Effect):
-    """The floor is not level: gravity leans forward or left in its frame; a stand stands on the same floor."""
+    """The floor is not level: in its frame gravity is tilted forward or left; a stand is on the same floor."""
 
     name = "ground_tilt"
     layer = "ground"
@@ -28,7 +28,7 @@ class GroundTilt(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         forward, left = spec.parameters["forward"], spec.parameters["left"]
-        return f"Gravity is tilted by {forward:.1f} deg forward and {left:.1f} deg to the left against the floor's normal."
+        return f"Gravity is tilted by {forward:.1f} deg forward and {left:.1f} deg to the left relative to the floor's normal."
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         if name not in self.equivalent_to:

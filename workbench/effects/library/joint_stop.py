@@ -1,4 +1,4 @@
-"""A joint ends before its servo does."""
+"""A joint's travel ends before that of its servo."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 
 WHOLE = 180.0
-"""An end [deg] that no servo reaches."""
+"""Limit [deg] that no servo reaches."""
 
 
 class JointStop(Effect):
-    """A joint ends before its servo does.
+    """A joint's travel ends before that of its servo.
 
-    The stop is on the servo's side. Where the robot's description ends nearer, that end stays.
+    The stop is on the servo's side. If the robot's description has a nearer limit, that limit remains.
     """
 
     name = "joint_stop"
@@ -31,7 +31,7 @@ class JointStop(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         ends = [f"{way} than {scalar(spec, end):.1f} deg" for end, way in (("lower", "lower"), ("upper", "higher"))
                 if abs(scalar(spec, end)) < WHOLE]
-        return f"{', '.join(spec.where)} goes no {' and no '.join(ends) or 'further than it could'}."
+        return f"{', '.join(spec.where)} goes {' and '.join(f'no {e}' for e in ends) or 'as far as its servo'}."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (-math.inf, math.inf)

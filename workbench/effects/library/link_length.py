@@ -1,4 +1,4 @@
-"""A link is longer or shorter than drawn, from its joint to the next."""
+"""A link is longer or shorter than in the model, from its joint to the next."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 
 SHARE = 0.5
-"""Share of a link's length by which a search may change it."""
+"""Fraction of a link's length by which a search may change it."""
 
 
 class LinkLength(Effect):
-    """A link is longer or shorter than drawn, from its joint to the next.
+    """A link is longer or shorter than in the model, from its joint to the next.
 
-    What hangs on the link moves along the line from its joint to the next (to the mean of several); of a last link the foot
-    moves, which is the shapes named so, or all that touch. The link's inertia stays as it was.
+    The links that it carries move along the line from its joint to the next (to the mean of several). At a last link the foot
+    moves: the shapes with "foot" in their names, or else all collision shapes. The link's inertia is unchanged.
     """
 
     name = "link_length"
@@ -32,7 +32,8 @@ class LinkLength(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         change = scalar(spec, "change")
-        return f"{', '.join(spec.where)} is {1000 * abs(change):.1f} mm {'longer' if change > 0 else 'shorter'} than drawn."
+        more = "longer" if change > 0 else "shorter"
+        return f"{', '.join(spec.where)} is {1000 * abs(change):.1f} mm {more} than in the model."
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import LoadFrictionTerm, ServoTerm
+from workbench.types import Mask
 
 
 class LoadFriction(Effect):
-    """Coulomb friction that grows with the torque that the gear transmits. Driven backwards, the gear needs 1 / (1 - coefficient)
-    of its Coulomb friction to turn; from a coefficient of 1 on it cannot be driven backwards.
+    """Coulomb friction that grows with the torque that the gear transmits. To be driven backwards, the gear needs a torque of
+    1 / (1 - coefficient) times its Coulomb friction; from a coefficient of 1 on, it cannot be driven backwards.
 
-    Two options, as published friction models of such servos have them (M. Duclusaud and G. Passault, arXiv 2410.08650): `static`,
-    more at rest, fading as exp(-(w / speed)^2); `backdrive`, more where motor and motion are opposed, so that the load drives the
-    motor. Grows up to a load of MOST_LOAD times the torque at full duty.
+    Two optional parts, as in published friction models of such servos (M. Duclusaud and G. Passault, arXiv 2410.08650): `static`,
+    additional friction at rest, decaying as exp(-(w / speed)^2); `backdrive`, additional friction where motor torque and motion
+    are opposed, so that the load drives the motor. Friction grows up to a load of MOST_LOAD times the torque at full duty.
     """
 
     name = "load_friction"
@@ -27,7 +25,7 @@ class LoadFriction(Effect):
     family = "friction"
     under_load = True
     needs_steady_load = True
-    # 0.17 and 0.3 by fits to an XL-330 and an STS3215; from about half on a gear holds by itself what hangs on it
+    # 0.17 and 0.3 by fits to an XL-330 and an STS3215; from about half on, a gear holds its load without motor torque
     parameters = (
         Parameter("coefficient", "", 0.0, 1.0, 0.15, seldom_beyond=0.6),
         Parameter("static", "", 0.0, 1.0, 0.15, option="static", seldom_beyond=0.6),
@@ -36,16 +34,16 @@ class LoadFriction(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         static, backdrive = (float(spec.parameters.get(name, 0.0)) for name in ("static", "backdrive"))  # type: ignore[arg-type]
-        more = [f"{100 * static:.0f} % more at rest"] if static else []
-        more += [f"{100 * backdrive:.0f} % more where the load drives the motor"] if backdrive else []
-        said = f", {' and '.join(more)}" if more else ""
+        more = [f"{100 * static:.0f} % at rest"] if static else []
+        more += [f"{100 * backdrive:.0f} % where the load drives the motor"] if backdrive else []
+        added = f", plus {' and '.join(more)}" if more else ""
         share = 100 * scalar(spec, "coefficient")
-        return f"{', '.join(spec.where)} loses {share:.0f} % of the torque that it transmits to friction{said}."
+        return f"{', '.join(spec.where)} loses {share:.0f} % of the transmitted torque to friction{added}."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, 0.0, self.parameters[2].typical, 0.0
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         at = here.astype(float)
         return LoadFrictionTerm(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
 

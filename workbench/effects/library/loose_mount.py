@@ -1,4 +1,4 @@
-"""Screws are loose: a link rocks about an axis that its servo does not turn."""
+"""Screws are loose: a link rocks about an axis other than its servo's."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class LooseMount(Effect):
-    """Screws are loose: a link rocks about an axis that its servo does not turn.
+    """Screws are loose: a link rocks about an axis other than its servo's.
 
-    `axis` is in the link's frame (where links' frames are parallel in neutral, the base's), through the joint's origin; its
-    length does not matter. The mount is between the servo's horn and the link, so that the axis turns with the servo.
+    `axis` is given in the link's frame (in neutral usually parallel to the base's) and passes through the joint's origin; its
+    length does not matter. The mount is between the servo's horn and the link, so the axis turns with the servo.
     """
 
     name = "loose_mount"
@@ -28,7 +28,7 @@ class LooseMount(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         x, y, z = spec.parameters["axis"]  # type: ignore[misc]
         return (f"The link of {', '.join(spec.where)} is loose: it rocks by {scalar(spec, 'play'):.1f} deg about "
-                f"({x:.2f}, {y:.2f}, {z:.2f}), across its servo's axis.")
+                f"({x:.2f}, {y:.2f}, {z:.2f}), which is not the servo's axis.")
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

@@ -1,4 +1,4 @@
-"""An asset's frame is not where it is said to be: its markers moved, or it was made in another pose."""
+"""An asset's frame is rotated: its markers moved, or it was defined in another pose."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from workbench.robot import EffectSpec
 
 
 class MarkerFrame(Effect):
-    """An asset's frame is not where it is said to be: its markers moved, or it was made in another pose.
+    """An asset's frame is rotated: its markers moved, or it was defined in another pose.
 
-    Assets are made in neutral with their frames parallel to the capture's axes (Motive's: x forward up to a yaw, y up, z right),
-    so the rotation vector's components are along these at rest. The recording starts with that rotation in place of none. As
-    zeros are taken as stated, it shows at rest as constant angles, opposite ones in the joints on either side of the
-    link, and in motion as rotation about axes that no servo turns. The pivot stays.
+    Assets are defined in neutral with their frames parallel to the capture's axes (Motive's: x forward up to a yaw, y up, z
+    right), so at rest the components of the rotation vector are along these. The recording starts with that rotation instead of
+    none. At rest it appears as constant angles, with opposite signs in the joints on either side of the link, and in motion as
+    rotation about axes that no servo turns. The pivot does not move.
     """
 
     name = "marker_frame"
@@ -30,7 +30,7 @@ class MarkerFrame(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         x, y, z = spec.parameters["rotation"]  # type: ignore[misc]
-        return f"The frame of {', '.join(spec.where)} is turned by ({x:.1f}, {y:.1f}, {z:.1f}) deg."
+        return f"The marker frame of {', '.join(spec.where)} is rotated by ({x:.1f}, {y:.1f}, {z:.1f}) deg."
 
     def measurement(self, measurement: Measurement, spec: EffectSpec) -> Measurement:
         turn = Rotation.from_rotvec(vector(si_values(self, spec), "rotation"))

@@ -1,4 +1,4 @@
-"""A servo that starts at more duty than nominal outside its dead zone."""
+"""Outside its dead zone, a servo starts with more duty than nominal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class MinimumDuty(ServoConstant):
-    """The duty at the edge of a servo's dead zone is larger than nominal by `duty`, and so is all duty beyond it: the effect of a
-    register of start-up force or punch."""
+    """The duty at the edge of a servo's dead zone is larger than nominal by `duty`, and so is all duty beyond it, as set
+    by a register for start-up force or punch."""
 
     name = "minimum_duty"
     field = "punch"
@@ -20,7 +20,8 @@ class MinimumDuty(ServoConstant):
     parameters = (Parameter("duty", "1", 0.0, 0.5, 0.02, seldom_beyond=0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The smallest duty of {', '.join(spec.where)} is {100 * scalar(spec, 'duty'):.1f} % of full duty above nominal."
+        share = 100 * scalar(spec, "duty")
+        return f"The smallest duty of {', '.join(spec.where)} is above nominal by {share:.1f} % of full duty."
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
         return any_proportional(model)

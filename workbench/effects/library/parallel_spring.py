@@ -1,4 +1,4 @@
-"""Something pulls a joint back to neutral: a cable across it, as a spring."""
+"""A joint is pulled back to neutral, for example by a cable across it that acts like a spring."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class ParallelSpring(Effect):
-    """Something pulls a joint back to neutral: a cable across it, as a spring.
+    """A joint is pulled back to neutral, for example by a cable across it that acts like a spring.
 
-    It acts on the servo's joint: where play or a soft gear is at the same joint, on the servo's side of it.
+    It acts on the servo's joint; if the same joint has backlash or a compliant gear, on the servo's side of it.
     """
 
     name = "parallel_spring"
@@ -20,7 +20,8 @@ class ParallelSpring(Effect):
     parameters = (Parameter("stiffness", "N m/rad", 0.0, 20.0, 0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"Something pulls {', '.join(spec.where)} back to neutral with {scalar(spec, 'stiffness'):.2f} N m/rad."
+        where = ", ".join(spec.where)
+        return f"{where} is pulled back to neutral with {scalar(spec, 'stiffness'):.2f} N m/rad, as if by a taut cable."
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

@@ -1,4 +1,4 @@
-"""A link carries a mass that the model lacks."""
+"""A link carries an additional mass that is not in the model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class Payload(Effect):
-    """A link carries a mass that the model lacks."""
+    """A link carries an additional mass that is not in the model."""
 
     name = "payload"
     layer = "inertia"
@@ -27,8 +27,8 @@ class Payload(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         x, y, z = spec.parameters["position"]  # type: ignore[misc]
-        return (f"{', '.join(spec.where)} carries {1000 * scalar(spec, 'mass'):.0f} g more, at ({1000 * x:.0f}, {1000 * y:.0f}, "
-                f"{1000 * z:.0f}) mm in its frame.")
+        return (f"{', '.join(spec.where)} carries an additional {1000 * scalar(spec, 'mass'):.0f} g at ({1000 * x:.0f}, "
+                f"{1000 * y:.0f}, {1000 * z:.0f}) mm in its frame.")
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         if name != self.reduces_to:

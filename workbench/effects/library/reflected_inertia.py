@@ -1,4 +1,4 @@
-"""Rotor and gear weigh more at the joint than nominal."""
+"""Rotor and gear have more inertia at the joint than nominal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class ReflectedInertia(ServoConstant):
     parameters = (Parameter("inertia", "kg m^2", 0.0, 0.1, 0.003),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} carries {spec.parameters['inertia']:.4f} kg m^2 more reflected inertia."
+        return f"The reflected inertia of {', '.join(spec.where)} is {spec.parameters['inertia']:.4f} kg m^2 above nominal."
 
 
 EFFECT = ReflectedInertia()

@@ -1,4 +1,4 @@
-"""A servo's law is steeper or flatter than nominal (duty per error); punch unchanged."""
+"""A servo's position gain (duty per error) is higher or lower than nominal; punch unchanged."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from workbench.effects.servo_constant import ServoConstant
 from workbench.robot import EffectSpec, RobotModel
 
 LEAST_DUTY, MOST_DUTY = 0.05, 0.9
-"""Range of duty in which the gain can be measured: less is lost in the counts of position, more may be saturated."""
+"""Range of duty in which the gain can be measured: below it, counts of position are too coarse; above it, duty may saturate."""
 COUNTS = 0.01
-"""Least standard error of a duty register, as it is read some milliseconds from the position."""
+"""Least standard error of a duty register, which is read some milliseconds before or after the position."""
 
 
 class ServoGain(ServoConstant):
-    """The servo law is steeper or flatter than nominal (duty per error); punch unchanged."""
+    """The position gain (duty per error) is higher or lower than nominal; punch unchanged."""
 
     name = "servo_gain"
     field = "gain"
     how = "multiply"
     family = "electrical"
-    # registers of steepness go in powers of two, as the AX-12A's compliance slope: one step
+    # gain registers have steps of powers of two, like the AX-12A's compliance slope: one step
     parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8, seldom_beyond=2.0),)
 
     def sentence(self, spec: EffectSpec) -> str:

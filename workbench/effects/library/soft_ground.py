@@ -1,4 +1,4 @@
-"""Feet sink into the floor, or their rubber is soft."""
+"""The floor, or the rubber of the feet, is soft."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class SoftGround(Effect):
-    """Feet sink into the floor, or their rubber is soft."""
+    """The floor, or the rubber of the feet, is soft."""
 
     name = "soft_ground"
     layer = "ground"

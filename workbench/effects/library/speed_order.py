@@ -1,4 +1,4 @@
-"""The k-th bus ID got the speed of the k-th name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
+"""The k-th bus ID gets the speed of the k-th joint by name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class SpeedOrder(Effect):
-    """The k-th bus ID got the speed of the k-th name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
+    """The k-th bus ID gets the speed of the k-th joint by name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
 
     name = "speed_order"
     layer = "timing"
     places = ("robot",)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return "Every servo runs at another servo's speed: goals went out in the order of bus IDs, speeds in the order of names."
+        return ("Every servo runs at another servo's speed: goals were sent in the order of bus IDs, but speeds in the order of "
+                "names.")
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
-        """Where all servos, of which there are several, have bus IDs, and moving speeds went out."""
+        """Only if there are several servos, all of them have bus IDs, and moving speeds were sent."""
         known = not set(model.bus_ids) < set(model.joints) and len(model.joints) > 1
         return known and any(bool(np.any(c.speeds > 0)) for c in sent)
 

@@ -1,4 +1,4 @@
-"""A servo that sticks: more dry friction at rest than when it turns."""
+"""A servo sticks: it has more dry friction at rest than in motion."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class _Sticking(ServoTerm):
 
 
 class StribeckFriction(Effect):
-    """More Coulomb friction at rest, which fades with speed as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
+    """Additional Coulomb friction at rest, decaying with speed as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
 
     name = "stribeck_friction"
     layer = "actuator"
@@ -50,7 +49,7 @@ class StribeckFriction(Effect):
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return 0.0, self.parameters[1].typical
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Sticking(here.astype(float) * values["torque"], values["speed"])
 
 

@@ -1,4 +1,4 @@
-"""A weak supply: its voltage drops with the current that all servos draw together."""
+"""A weak supply: its voltage drops with the total current of all servos."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 LEAST_DRAWN = 0.3
 """Least change of the summed duties for a log's voltage to determine a sag."""
@@ -48,7 +47,7 @@ class SupplySag(Effect):
         return f"The supply drops by {scalar(spec, 'drop'):.2f} V for each servo at full duty."
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """The slope of the voltage register over the sum of all servos' duties."""
+        """The slope of the voltage register over the sum of the servos' duties."""
         drops = []
         for log in logs:
             if log.voltage is None or not log.duty:
@@ -59,7 +58,7 @@ class SupplySag(Effect):
                 drops.append(-float(np.polyfit(drawn[good], log.voltage[good], 1)[0]))
         return mean_of_logs(drops, COUNT)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Sagging(values["drop"])
 
 

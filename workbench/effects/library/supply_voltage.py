@@ -1,4 +1,4 @@
-"""The supply is not at its nominal voltage: every servo has that share of its stall torque and no-load speed."""
+"""The supply is not at its nominal voltage: stall torque and no-load speed of every servo change in proportion."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
 
 STANDS = 1.5
-"""Largest supply voltage, over the voltage at which a servo is rated or said to run: a full pack of two cells on
-a servo rated at 6 V is 1.4; more burns it."""
+"""Largest supply voltage relative to a servo's rated or nominal one: 1.4 for a fully charged battery of two cells on a servo
+rated at 6 V; more would burn it."""
 REGISTER = 0.1
 """Resolution of the voltage that servos measure [V]."""
 
@@ -31,7 +31,7 @@ class SupplyVoltage(Effect):
     parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The servos see {spec.parameters['voltage']:.1f} V."
+        return f"The supply voltage at the servos is {spec.parameters['voltage']:.1f} V."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (float(np.mean([model.servo(j).supply_voltage for j in model.joints])),)
@@ -41,7 +41,7 @@ class SupplyVoltage(Effect):
         return STANDS * max(nominal, *(model.servo(j).rated_voltage for j in model.joints)) - nominal
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """The median that servos measured in each log, to the resolution of their registers."""
+        """The median of the voltage measured by the servos, for each log, to the resolution of their registers."""
         seen = [log.voltage[np.isfinite(log.voltage)] for log in logs if log.voltage is not None]
         return mean_of_logs([float(np.median(v)) for v in seen if len(v)], REGISTER)
 

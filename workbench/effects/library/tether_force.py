@@ -1,4 +1,4 @@
-"""A cable pulls at the robot with a steady force."""
+"""A cable pulls on the robot with a constant force."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workbench.types import Array
 
 
 class TetherForce(Effect):
-    """A cable pulls at the robot with a steady force."""
+    """A cable pulls on the robot with a constant force."""
 
     name = "tether_force"
     layer = "ground"
@@ -23,7 +23,7 @@ class TetherForce(Effect):
     parameters = (Parameter("force", "N", -20.0, 20.0, 0.3, vector=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return "Something pulls at the base with ({:.2f}, {:.2f}, {:.2f}) N.".format(*spec.parameters["force"])  # type: ignore[misc]
+        return "An external force of ({:.2f}, {:.2f}, {:.2f}) N acts on the base.".format(*spec.parameters["force"])  # type: ignore[misc]
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         if name not in self.equivalent_to:

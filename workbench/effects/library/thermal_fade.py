@@ -1,4 +1,4 @@
-"""Motors that weaken as they warm."""
+"""Motors get weaker as they get warm."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
+from workbench.types import Mask
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class _Fading(ServoTerm):
 
 
 class ThermalFade(Effect):
-    """Motors that weaken as they warm: duty torque fades with the time since each take's first command."""
+    """Motors get weaker as they get warm: duty torque decays with the time since each take's first command."""
 
     name = "thermal_fade"
     layer = "actuator"
@@ -38,9 +36,9 @@ class ThermalFade(Effect):
     parameters = (Parameter("rate", "1/s", 0.0, 1.0, 0.01),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The servos lose {100 * scalar(spec, 'rate'):.1f} % of their torque each second from the first command on."
+        return f"The servos lose {100 * scalar(spec, 'rate'):.1f} % of their torque per second after the first command."
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Fading(values["rate"])
 
 

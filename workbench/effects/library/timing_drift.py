@@ -1,4 +1,4 @@
-"""The controller loses some time at each pose."""
+"""Each pose of the controller takes longer than commanded, and the delays add up."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class TimingDrift(Effect):
-    """The controller loses some time at each pose."""
+    """Each pose of the controller takes longer than commanded, and the delays add up."""
 
     name = "timing_drift"
     layer = "timing"

@@ -1,4 +1,4 @@
-"""A motor whose torque ends early: the driver's current limit, heat, or another servo of the family."""
+"""A motor's torque is limited: by the driver's current limit, by heat, or because it is another servo of the family."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,8 @@ class _Ceiling(ServoTerm):
 
 
 class TorqueCeiling(Effect):
-    """The motor's torque, duty torque less back-EMF, is limited: the driver's current limit, heat, or another servo."""
+    """The motor's torque (duty torque minus back-EMF) is limited: by the driver's current limit, by heat, or
+    because the servo is of another model."""
 
     name = "torque_ceiling"
     layer = "actuator"
@@ -40,12 +40,12 @@ class TorqueCeiling(Effect):
     parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The motor of {', '.join(spec.where)} gives no more than {scalar(spec, 'torque'):.2f} N m."
+        return f"The motor torque of {', '.join(spec.where)} is limited to {scalar(spec, 'torque'):.2f} N m."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Ceiling(np.where(here, values["torque"], np.inf))
 
 

@@ -1,4 +1,4 @@
-"""A motor whose torque grows less and less with its duty: an H-bridge's drop, a magnetic circuit, a weak driver."""
+"""A motor's torque grows less than in proportion to its duty: a drop in the H-bridge, magnetic saturation, a weak driver."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoTerm, TermNumbers
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -29,8 +28,8 @@ class _Saturating(ServoTerm):
 
 
 class TorqueSaturation(Effect):
-    """A motor whose torque x, duty torque less back-EMF, acts as x / (1 + |x|/torque): nearly all of it while small, half of it
-    at `torque`, never more than that. Smooth, unlike a ceiling."""
+    """The motor's torque x (duty torque minus back-EMF) acts as x / (1 + |x|/torque): almost unchanged while it is small, halved
+    at `torque`, and never above `torque`. Unlike a ceiling, it is smooth."""
 
     name = "torque_saturation"
     layer = "actuator"
@@ -41,12 +40,12 @@ class TorqueSaturation(Effect):
     parameters = (Parameter("torque", "N m", 0.02, 1e8, 1.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"The motor of {', '.join(spec.where)} saturates: of {scalar(spec, 'torque'):.2f} N m half arrives."
+        return f"The motor of {', '.join(spec.where)} saturates: a torque of {scalar(spec, 'torque'):.2f} N m is halved."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (math.inf,)
 
-    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+    def servo_term(self, here: Mask, values: Mapping[str, float]) -> ServoTerm:
         return _Saturating(np.where(here, values["torque"], np.inf))
 
 

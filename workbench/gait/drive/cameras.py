@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from workbench.compare.metrics import heading
 from workbench.device.capture import Recorder
 from workbench.files import InputError
-from workbench.gait.drive.walk import Cameras, Seen, captured, lies
+from workbench.gait.drive.walk import Cameras, Seen, lies, observe_base
 from workbench.robot import RobotModel
 from workbench.simulation.virtual_robot import VirtualRobot
 from workbench.types import Array
@@ -32,7 +32,7 @@ class EmulatedCameras:
 
     def seen(self) -> Seen:
         """The robot's pose now."""
-        return captured(self._robot.body.base(self._robot.clock.now), self._cameras, self._rng)
+        return observe_base(self._robot.body.base(self._robot.clock.now), self._cameras, self._rng)
 
 
 class MotiveCameras:

@@ -20,7 +20,7 @@ from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM, NAME, plain, read_certificate
 from workbench.gait.draws import bound
 from workbench.gait.drive.family import GaitFamily, Steer
-from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_map, fitted, rows_of
+from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_increments, fit_step_map, rows_of
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -87,7 +87,7 @@ class FamilyCertificate:
         return not self.problems
 
     def summary(self) -> str:
-        """In a few lines, for a person."""
+        """The certificate in a few lines, for a person."""
         d, deg = self.draws, np.degrees
         lines = [f"turns up to {self.most:g} rad and sideways strides up to {1000 * self.most_side:g} mm per stance, changes up "
                  f"to {self.most_change:g} rad and {1000 * self.most_side_change:g} mm: {d['falls']} of {d['count']} "
@@ -101,7 +101,7 @@ class FamilyCertificate:
         return "\n".join([*lines, *(f"not kept: {p}" for p in self.problems)])
 
     def to_json(self) -> dict[str, Any]:
-        """As in the file, with the sum that finds changes."""
+        """Content of the certificate's file, with the checksum that reveals changes."""
         content = plain({"format": FORMAT, "claim": CLAIM, "kept": self.kept, **vars(self), "step_map": vars(self.step_map)})
         return {**content, "sha256": _digest(content)}
 
@@ -125,7 +125,7 @@ def certify_family(family: GaitFamily, gait_sha256: str, ensemble: Ensemble, fol
     seconds = family.start_seconds + o.cycles * family.period
     jobs = [Job(r, config, family.sequence(steers), seconds) for r in robots]
     takes = simulate_batch(jobs, progress=lambda done, of: progress(f"drawn robot {done} of {of}", done / of))
-    maps = [fitted(*rows_of(t, steers, family), o.most) for t in takes if not fell(t)]
+    maps = [fit_increments(*rows_of(t, steers, family), o.most) for t in takes if not fell(t)]
     falls = len(takes) - len(maps)
     draws = {"count": len(takes), "falls": falls, "falls at most": bound(falls, len(takes)), **_spread(maps, family.period)}
     problems = (*broken_limits(family, o), *_problems(nominal, maps, falls, o))
@@ -145,7 +145,7 @@ def broken_limits(family: GaitFamily, o: FamilyOptions) -> list[str]:
 
 
 def bounded_steers(rng: np.random.Generator, o: FamilyOptions) -> list[Steer]:
-    """Of each of the cycles, at random within the largest turn, sideways stride and changes; all limits are met."""
+    """Steering of each cycle, at random within the largest turn, sideways stride and changes; all limits are met."""
     most, change = np.array([o.most, o.most_side]), np.array([o.most_change, o.most_side_change])
     out, last = list[Steer](), np.zeros(2)
     for _ in range(0, o.cycles, o.hold):
@@ -175,8 +175,8 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
         step = content["step_map"]
         numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
         step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
-        told: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
-        found = FamilyCertificate(**told, step_map=step_map, problems=tuple(content["problems"]))
+        content_fields: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
+        found = FamilyCertificate(**content_fields, step_map=step_map, problems=tuple(content["problems"]))
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
     if found.model_sha256 != model.sha256:
@@ -189,7 +189,7 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
 
 
 def gait_sha256(gait: str | Path) -> str:
-    """Of the tables that the gait's certificate speaks of. InputError where it cannot be read."""
+    """Digest of the tables that the gait's certificate states. InputError where it cannot be read."""
     return read_certificate(Path(gait).parent / NAME).tables["gait"]
 
 

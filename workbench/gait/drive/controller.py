@@ -13,7 +13,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from workbench.gait.drive import observer as at
 from workbench.gait.drive.family import Steer
-from workbench.gait.drive.observer import first_state, observed
+from workbench.gait.drive.observer import first_state, update_state
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, Planned, corridor, of_robot, plan
@@ -43,7 +43,7 @@ class CycleController(LeafSystem):
         self.DeclareVectorOutputPort("state", 4, self._say(lambda x: x[at.X:at.BIAS + 1]))
         self.DeclareVectorOutputPort("along", 1, self._say(lambda x: x[at.ALONG:at.ALONG + 1]))
         self.DeclareVectorOutputPort("stop", 1, self._say(lambda x: np.array([float(self._ends(x))])))
-        self.DeclareVectorOutputPort("lost", 1, self._say(lambda x: np.array([float(self._lost(x))])))
+        self.DeclareVectorOutputPort("lost", 1, self._say(lambda x: np.array([float(self._is_lost(x))])))
         self.DeclarePeriodicDiscreteUpdateEvent(period, period, self._update)
 
     def _say(self, of: Callable[[Array], Array]) -> Callable[[Context, BasicVector], None]:
@@ -51,17 +51,17 @@ class CycleController(LeafSystem):
             out.SetFromVector(of(context.get_discrete_state(0).value()))
         return calculate
 
-    def _lost(self, x: Array) -> bool:
+    def _is_lost(self, x: Array) -> bool:
         return bool(x[at.LOST] * self.period >= self.options.blind - 1e-9)
 
     def _ends(self, x: Array) -> bool:
-        return bool(self._lost(x) or x[at.ALONG] + 1.5 * x[at.AHEAD] >= self.path.length)
+        return bool(self._is_lost(x) or x[at.ALONG] + 1.5 * x[at.AHEAD] >= self.path.length)
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         x = np.array(context.get_discrete_state(0).value())
         x[at.PLAYED], x[at.NEXT], before = x[at.NEXT], x[at.AFTER], x[at.PLAYED]
         x[at.PLAYED_SIDE], x[at.NEXT_SIDE] = x[at.NEXT_SIDE], x[at.AFTER_SIDE]
-        x = observed(x, np.asarray(self._pose.Eval(context)), before, self.map, self.options)
+        x = update_state(x, np.asarray(self._pose.Eval(context)), before, self.map, self.options)
         x[at.ALONG], left = self.path.project(x[[at.X, at.Y]], x[at.ALONG])
         decided = self._decide(x, left)
         x[at.AFTER], x[at.AFTER_SIDE] = decided.turn, decided.side
@@ -71,21 +71,21 @@ class CycleController(LeafSystem):
     def _decide(self, x: Array, left: float) -> Steer:
         """For the cycle after next, from the state at the end of this one: first through the cycle that is committed."""
         m, o = self._own(x), self.options
-        along, left, heading = self._committed(x, left, m)
+        along, left, heading = self._predict_committed(x, left, m)
         if o.law == "proportional":
-            side = limited(Steer(0.0, -m.aside / m.side_gain if m.side_gain else 0.0), _next(x), o).side
+            side = limit_steer(Steer(0.0, -m.aside / m.side_gain if m.side_gain else 0.0), _next(x), o).side
             off = heading - self.path.heading(along) + np.arctan(left / o.reach) + (m.aside + m.side_gain * side) / m.ahead
             bend = self.path.heading(along + m.ahead) - self.path.heading(along)
             wanted = bend - (m.bias + x[at.BIAS] + m.side_turns * side) - off * m.ahead / o.reach
-            return limited(Steer(wanted / (m.gain + m.memory), side), _next(x), o)
-        planned = self._planned(along, left, heading, x, m)
-        return limited(Steer(planned.turns[0], planned.sides[0]), _next(x), o)
+            return limit_steer(Steer(wanted / (m.gain + m.memory), side), _next(x), o)
+        planned = self._plan(along, left, heading, x, m)
+        return limit_steer(Steer(planned.turns[0], planned.sides[0]), _next(x), o)
 
     def _own(self, x: Array) -> StepMap:
         """The map of this robot, as it is estimated."""
         return of_robot(self.map, x[at.AHEAD], x[at.ASIDE], x[at.GAIN])
 
-    def _committed(self, x: Array, left: float, m: StepMap) -> tuple[float, float, float]:
+    def _predict_committed(self, x: Array, left: float, m: StepMap) -> tuple[float, float, float]:
         """Distance along the path, lateral error [m] and heading [rad] after the cycle that is on the controller already."""
         off = x[at.HEADING] - self.path.heading(x[at.ALONG])
         along = x[at.ALONG] + m.ahead
@@ -93,32 +93,32 @@ class CycleController(LeafSystem):
         left = left + m.ahead * np.sin(off - bend / 2) + m.aside + m.moved_aside(_next(x))
         return along, left, x[at.HEADING] + m.turned(_next(x), x[at.PLAYED]) + x[at.BIAS]
 
-    def _planned(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
+    def _plan(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
         ahead = np.asarray(along + m.ahead * np.arange(self.options.horizon + 1), float)
         targets = np.array([self.path.heading(s) for s in ahead])
         bounds = corridor(self.path, ahead, left, self.discs, self.options.clearance) if self.discs else None
         return plan(left, heading, _next(x), x[at.BIAS], targets, m, self.options, bounds)
 
     def planned_points(self, context: Context) -> Array:
-        """Where the plan leads from the present state: positions (N + 1, 2) [m] from the cycle after next on."""
+        """Planned positions from the present state: (N + 1, 2) [m] from the cycle after next on."""
         x = np.array(context.get_discrete_state(0).value())
         m = self._own(x)
         _, left = self.path.project(x[[at.X, at.Y]], x[at.ALONG])
-        along, left, heading = self._committed(x, left, m)
-        planned = self._planned(along, left, heading, x, m)
+        along, left, heading = self._predict_committed(x, left, m)
+        planned = self._plan(along, left, heading, x, m)
         return np.array([self.path.point(along + m.ahead * j, y) for j, y in enumerate(planned.left)])
 
 
 def _next(x: Array) -> Steer:
-    """Of the cycle that is on the controller already."""
+    """Steering of the cycle that is on the controller already."""
     return Steer(x[at.NEXT], x[at.NEXT_SIDE])
 
 
-def limited(steer: Steer, before: Steer, o: DriveOptions) -> Steer:
+def limit_steer(steer: Steer, before: Steer, o: DriveOptions) -> Steer:
     """Turn and sideways stride clipped to the largest that a table has, and to the largest change between consecutive tables."""
-    return Steer(_clipped(steer.turn, before.turn, o.most, o.most_change),
-                 _clipped(steer.side, before.side, o.most_side, o.most_side_change))
+    return Steer(_clip(steer.turn, before.turn, o.most, o.most_change),
+                 _clip(steer.side, before.side, o.most_side, o.most_side_change))
 
 
-def _clipped(value: float, before: float, most: float, change: float) -> float:
+def _clip(value: float, before: float, most: float, change: float) -> float:
     return float(np.clip(np.clip(value, before - change, before + change), -most, most))

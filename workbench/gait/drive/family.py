@@ -13,7 +13,7 @@ from workbench.files import InputError
 from workbench.gait.certificate import NAME, read_certificate
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
-from workbench.gait.table import GaitTable, gait_table, joined
+from workbench.gait.table import GaitTable, gait_table, join_tables
 from workbench.motion import Commands, PoseTable
 from workbench.robot import RobotModel
 
@@ -53,19 +53,21 @@ class GaitFamily:
     def cycle(self, steer: Steer = STRAIGHT, before: Steer = STRAIGHT, pace: float = 1.0, pace_before: float = 1.0) -> PoseTable:
         """One cycle after one steered by `before` at `pace_before`, whose last goals are elsewhere: the joints' speeds into its
         first pose are those of that way. The controller's program checks that the pose is within reach of them."""
-        return self._entered(self._loop(steer, pace), self._loop(before, pace_before))
+        return self._enter(self._loop(steer, pace), self._loop(before, pace_before))
 
     def stop(self, before: Steer = STRAIGHT) -> PoseTable:
-        """From a cycle steered by `before` to neutral, going straight."""
+        """The poses from a cycle steered by `before` to neutral, going straight."""
         straight = self._table(STRAIGHT)
         rest = _part(straight.cycle, slice(self.phase, None))
-        return self._entered(joined([rest, straight.stop], "drive"), self._loop(before, 1.0))
+        return self._enter(join_tables([rest, straight.stop], "drive"), self._loop(before, 1.0))
 
     @property
     def start(self) -> PoseTable:
-        """From neutral into the gait, going straight."""
+        """The poses from neutral into the gait, going straight."""
         straight = self._table(STRAIGHT)
-        return joined([straight.start, _part(straight.cycle, slice(0, self.phase))], "drive") if self.phase else straight.start
+        if not self.phase:
+            return straight.start
+        return join_tables([straight.start, _part(straight.cycle, slice(0, self.phase))], "drive")
 
     @property
     def start_seconds(self) -> float:
@@ -74,13 +76,13 @@ class GaitFamily:
 
     @property
     def period(self) -> float:
-        """Of one cycle [s], the same for all of the family."""
+        """Duration of one cycle [s], the same for the whole family."""
         return self._table(STRAIGHT).period
 
     def sequence(self, steers: Sequence[Steer]) -> Commands:
         """The start, and a cycle for each of `steers`, as one schedule."""
         cycles = [self.cycle(u, before) for before, u in zip((STRAIGHT, *steers), steers)]
-        return joined([self.start, *cycles], "drive").commands(1)
+        return join_tables([self.start, *cycles], "drive").commands(1)
 
     def shape_of(self, steer: Steer, pace: float = 1.0) -> GaitShape:
         """The shape whose cycles are steered so and have this pace, rounded as the family's tables are."""
@@ -101,7 +103,7 @@ class GaitFamily:
         cycle = self._table(steer, pace).cycle
         return _part(cycle, np.roll(np.arange(len(cycle)), -self.phase))
 
-    def _entered(self, table: PoseTable, before: PoseTable) -> PoseTable:
+    def _enter(self, table: PoseTable, before: PoseTable) -> PoseTable:
         way = np.abs(table.goals[0] - before.goals[-1]) * np.array([u.count for u in table.units])
         needed = np.ceil(self.shape.hurry * way / (table.dwells_ms[0] / 1000) / self.machine.speed_unit)
         speeds = table.speeds.copy()

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from workbench.compare.metrics import heading
@@ -16,7 +15,7 @@ from workbench.gait.drive.family import STRAIGHT, Steer
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.walk import Seen, StoppedError, Walk
 from workbench.recording.take import Take
-from workbench.types import Array, Progress
+from workbench.types import Array, Mask, Progress
 
 Watch = Callable[[Seen, Array], None]
 """Called at the end of each cycle with the robot's pose and the planned positions (N, 2) [m]."""
@@ -47,7 +46,7 @@ class Driven:
     take: Take
 
     @property
-    def settled(self) -> NDArray[np.bool_]:
+    def settled(self) -> Mask:
         """Cycles whose errors are judged."""
         return np.asarray(self.along >= min(SETTLED, self.path.length / 2))
 
@@ -71,7 +70,7 @@ class Driven:
             errors = []
             for xy, angle in zip(self.take.p_WB[inside][::5, :2], yaw[inside][::5]):
                 near, _ = self.path.project(xy, near)
-                errors.append(_wrapped(angle - self.path.heading(near)))
+                errors.append(_wrap(angle - self.path.heading(near)))
             out[k] = np.mean(errors)
         return out
 
@@ -92,7 +91,7 @@ def drive(walk: Walk, path: WayPath, controller: CycleController, most_cycles: i
     """
     rows: list[list[float]] = []
     try:
-        reason = _walked(walk, path, controller, most_cycles, steer, rows, progress, watch)
+        reason = _walk(walk, path, controller, most_cycles, steer, rows, progress, watch)
         if reason != FELL:
             walk.end()
     except StoppedError as e:
@@ -102,8 +101,8 @@ def drive(walk: Walk, path: WayPath, controller: CycleController, most_cycles: i
     return Driven(path, columns[:3].T, columns[3:6].T, turns, sides, left, off, along, biases, reason, walk.take())
 
 
-def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles: int, steer: bool, rows: list[list[float]],
-            progress: Progress, watch: Watch | None) -> str:
+def _walk(walk: Walk, path: WayPath, controller: CycleController, most_cycles: int, steer: bool, rows: list[list[float]],
+          progress: Progress, watch: Watch | None) -> str:
     """Start and cycles, up to the last one before the stop; a row for each end of a cycle. Returns why it ends."""
     context, seen = controller.CreateDefaultContext(), walk.begin()
     played = committed = STRAIGHT  # the cycle that has ended, and the next, which is on the controller already
@@ -114,8 +113,8 @@ def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles:
         left = math.nan
         if np.isfinite(seen.pose).all():
             near, left = path.project(seen.pose[:2], near)
-        after, bias, ends = _decided(controller, context, seen.captured) if steer else (STRAIGHT, math.nan, "")
-        off = _wrapped(seen.pose[2] - path.heading(near))
+        after, bias, ends = _decide(controller, context, seen.captured) if steer else (STRAIGHT, math.nan, "")
+        off = _wrap(seen.pose[2] - path.heading(near))
         rows.append([*seen.pose, *seen.captured, played.turn, played.side, left, off, near, bias])
         progress(f"cycle {k + 1}", min(near / path.length, 1.0))
         if watch is not None:
@@ -130,8 +129,8 @@ def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles:
     return reason
 
 
-def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[Steer, float, str]:
-    """One update: what the cycle after next is steered by, the estimated bias [rad per cycle], and the reason to stop or ""."""
+def _decide(controller: CycleController, context: Context, seen: Array) -> tuple[Steer, float, str]:
+    """One update: the steering of the cycle after next, the estimated bias [rad per cycle], and the reason to stop or ""."""
     controller.GetInputPort("pose").FixValue(context, seen)
     context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
     turn, side, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context))
@@ -140,5 +139,5 @@ def _decided(controller: CycleController, context: Context, seen: Array) -> tupl
     return Steer(float(turn[0]), float(side[0])), float(state[3]), why if stop[0] else ""
 
 
-def _wrapped(angle: float) -> float:
+def _wrap(angle: float) -> float:
     return float(np.arctan2(np.sin(angle), np.cos(angle)))

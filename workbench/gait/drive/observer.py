@@ -27,7 +27,7 @@ def first_state(m: StepMap, options: DriveOptions) -> Array:
     return x
 
 
-def observed(x: Array, pose: Array, before: float, m: StepMap, options: DriveOptions) -> Array:
+def update_state(x: Array, pose: Array, before: float, m: StepMap, options: DriveOptions) -> Array:
     """The state after one more cycle: predicted by the map, corrected by the pose, if there is one.
 
     x: state whose PLAYED and PLAYED_SIDE are already those of this cycle; pose (3,): x, y [m], heading [rad], NaN where there is

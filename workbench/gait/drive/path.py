@@ -56,7 +56,7 @@ class WayPath:
         return float(self.s[k] + along), left
 
     def heading(self, s: float) -> float:
-        """Of the tangent at `s` [m along the path], continuous [rad]."""
+        """Direction of the tangent at `s` [m along the path], continuous [rad]."""
         return float(np.interp(s, self.s, self._heading))
 
     def point(self, s: float, left: float = 0.0) -> Array:

@@ -21,7 +21,7 @@ from workbench.gait.drive.family import GaitFamily, Steer
 from workbench.gait.drive.walk import Seen, StoppedError
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
-from workbench.types import Array
+from workbench.types import Array, Progress, no_progress
 
 
 class PoseSource(Protocol):
@@ -61,7 +61,7 @@ class ControllerWalk:
     """
 
     def __init__(self, port: Any, family: GaitFamily, cameras: PoseSource, stop: Callable[[], str],
-                 options: RobotWalkOptions | None = None, tell: Callable[[str, float | None], None] = lambda what, done: None
+                 options: RobotWalkOptions | None = None, tell: Progress = no_progress
                  ) -> None:
         self.family, self.cameras, self.options = family, cameras, options or RobotWalkOptions()
         self.controller = CycleController(port, stop)

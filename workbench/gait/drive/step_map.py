@@ -94,25 +94,26 @@ def fit_step_map(family: GaitFamily, model: RobotModel, seed: int = 0, options: 
         A, moved = rows_of(take, steers, family)
         rows.append(A)
         changes.append(moved)
-    return fitted(np.concatenate(rows), np.concatenate(changes), options.most, steered=True)
+    return fit_increments(np.concatenate(rows), np.concatenate(changes), options.most, steered=True)
 
 
 def rows_of(take: Take, steers: Sequence[Steer], family: GaitFamily) -> tuple[Array, Array]:
-    """Rows for `fitted` of a take that was steered so, without the first two cycles, which the start still moves."""
+    """Rows for `fit_increments` of a take that was steered so, without the first two cycles, which the start still moves."""
     moved = increments(cycle_poses(take, family.start_seconds, family.period, len(steers)))
     turns, sides = np.array([[u.turn, u.side] for u in steers]).T
     return np.column_stack([np.ones(len(turns) - 1), turns[1:], turns[:-1], sides[1:]])[1:], moved[2:]
 
 
 def increments(poses: Array) -> Array:
-    """Of poses (N + 1, 3): ahead, aside [m] in the frame at each cycle's beginning, and heading change [rad], (N, 3)."""
+    """Increments (N, 3) between poses (N + 1, 3): ahead and aside [m] in the frame at each cycle's beginning, and heading change
+    [rad]."""
     step, yaw = np.diff(poses, axis=0), poses[:-1, 2]
     ahead = np.cos(yaw) * step[:, 0] + np.sin(yaw) * step[:, 1]
     aside = -np.sin(yaw) * step[:, 0] + np.cos(yaw) * step[:, 1]
     return np.column_stack([ahead, aside, np.arctan2(np.sin(step[:, 2]), np.cos(step[:, 2]))])
 
 
-def fitted(A: Array, changes: Array, most: float, steered: bool = False) -> StepMap:
+def fit_increments(A: Array, changes: Array, most: float, steered: bool = False) -> StepMap:
     """Least squares: A (N, 4) of ones, turns and the turns before [rad], and sideways strides [m]; changes (N, 3) as `increments`
     gives them. steered: InputError where the largest turn changes the heading by less than its scatter."""
     here = A[:, [0, 1, 3]]

@@ -120,10 +120,10 @@ class SimulatedWalk:
                 self._run.advance(lasted)
 
     def _seen(self) -> Seen:
-        return captured(self._run.base, self.cameras, self._rng)
+        return observe_base(self._run.base, self.cameras, self._rng)
 
 
-def captured(base: BaseState | None, cameras: Cameras, rng: np.random.Generator) -> Seen:
+def observe_base(base: BaseState | None, cameras: Cameras, rng: np.random.Generator) -> Seen:
     """A free base as it is and as the cameras see it."""
     assert base is not None, "the base is free"
     pose = np.array([*base.p_WB[:2], float(heading(base.quat_WB[None])[0])])

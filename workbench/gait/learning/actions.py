@@ -25,11 +25,12 @@ class Actions(Protocol):
 
     @property
     def start(self) -> Commands:
-        """From neutral into the gait."""
+        """Commands from neutral into the gait."""
         ...
 
     def commands(self, k: int, action: Array, before: Array) -> Commands:
-        """Of the k-th action (size,) of an episode, after the action `before` (size,); its `end` is when it is over [s]."""
+        """Commands of the k-th action (size,) of an episode, after the action `before` (size,); its `end` is when it is over
+        [s]."""
         ...
 
     def shape(self, mean: Array) -> GaitShape:
@@ -47,11 +48,11 @@ class CycleActions:
 
     @property
     def start(self) -> Commands:
-        """From neutral into the gait."""
+        """Commands from neutral into the gait."""
         return self.family.start.commands(1)
 
     def commands(self, k: int, action: Array, before: Array) -> Commands:
-        """One cycle."""
+        """Commands of one cycle."""
         (turn, pace), (turn_before, pace_before) = self._meant(action), self._meant(before)
         return self.family.cycle(Steer(turn), Steer(turn_before), pace, pace_before).commands(1)
 
@@ -87,11 +88,11 @@ class PoseActions:
 
     @property
     def start(self) -> Commands:
-        """From neutral into the gait."""
+        """Commands from neutral into the gait."""
         return self._table[0]
 
     def commands(self, k: int, action: Array, before: Array) -> Commands:
-        """One pose."""
+        """Commands of one pose."""
         machine, (_, goals, dwells) = self.family.machine, self._table
         pose = k % self.in_cycle
         wanted, last = self._within(goals[pose], action), self._within(goals[pose - 1], before)

@@ -93,7 +93,7 @@ class GaitVectorEnv(VectorEnv):
         return self._seen(), {}
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
-        """One action each."""
+        """Takes one action in each environment."""
         assert self._episodes, "reset first"
         ended = [e.fell or e.over for e in self._episodes]
         self._episodes = [self._new() if end else e for e, end in zip(self._episodes, ended)]

@@ -38,7 +38,7 @@ class Domains:
         self.actions, self.robots, self.options = actions, tuple(robots), options
         self._begun: dict[int, CompiledSteppedRun] = {}
 
-    def begun(self, which: int) -> CompiledSteppedRun:
+    def begin(self, which: int) -> CompiledSteppedRun:
         """A run of a robot that has played the start."""
         if which not in self._begun:
             robot, start = self.robots[which], self.actions.start
@@ -58,10 +58,10 @@ class Episode:
 
     def __init__(self, domains: Domains, which: int) -> None:
         self.actions, self.options = domains.actions, domains.options
-        self.run, self.k, self.fell = domains.begun(which), 0, False
+        self.run, self.k, self.fell = domains.begin(which), 0, False
         self.before = np.zeros(self.actions.size)
         self._goals = self.actions.start.goals[-1]
-        self._pose, self._velocity = self._measured(), np.zeros(2)
+        self._pose, self._velocity = self._measure_pose(), np.zeros(2)
 
     @staticmethod
     def seen_by(actions: Actions) -> int:
@@ -85,7 +85,7 @@ class Episode:
             self.fell = True
             return -o.fall
         self.k, self.before, self._goals = self.k + 1, action, commands.goals[-1]
-        was, self._pose = self._pose, self._measured()
+        was, self._pose = self._pose, self._measure_pose()
         moved = self._pose[:2] - was[:2]
         c, s = math.cos(was[2]), math.sin(was[2])
         self._velocity = np.array([c * moved[0] + s * moved[1], -s * moved[0] + c * moved[1]]) / commands.end
@@ -113,7 +113,7 @@ class Episode:
         assert base is not None
         return lies(base.quat_WB)
 
-    def _measured(self) -> Array:
+    def _measure_pose(self) -> Array:
         """x, y [m], heading, roll and pitch [rad]."""
         base = self.run.base
         assert base is not None

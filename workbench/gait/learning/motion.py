@@ -17,7 +17,7 @@ SETTLES = 4
 """Cycles after which a walk is its limit cycle: the demo's gait is back in its cycle two after a push."""
 
 
-def walked(policy: Policy, domains: Domains, which: int) -> tuple[Episode, Array]:
+def walk_episode(policy: Policy, domains: Domains, which: int) -> tuple[Episode, Array]:
     """A whole episode on one robot, and its actions (K, size), fewer where it fell."""
     episode, actions = Episode(domains, which), []
     while not (episode.fell or episode.over):
@@ -26,10 +26,10 @@ def walked(policy: Policy, domains: Domains, which: int) -> tuple[Episode, Array
     return episode, np.array(actions)
 
 
-def learned_shape(policy: Policy, domains: Domains, which: int = 0) -> GaitShape:
-    """The gait that repeats the mean actions of the policy's cycles on one robot, without the first ones. Its reactions to
-    disturbances are lost, as a table has none. InputError where the robot falls, or has too few cycles."""
-    episode, actions = walked(policy, domains, which)
+def learned_shape(policy: Policy, domains: Domains) -> GaitShape:
+    """The gait that repeats the mean actions of the policy's cycles on the first robot, without the first SETTLES. Its reactions
+    to disturbances are lost, as a table has none. InputError where the robot falls, or has too few cycles."""
+    episode, actions = walk_episode(policy, domains, 0)
     if episode.fell:
         raise InputError(None, "the robot falls under the learned policy; it is no motion")
     cycles = actions.reshape(-1, domains.actions.in_cycle, domains.actions.size)[SETTLES:]

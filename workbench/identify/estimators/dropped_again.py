@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
+from workbench.identify.estimators.dropped_in_motion import played_without
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import with_effects
@@ -27,6 +28,10 @@ class TakesAsPlayed:
     sent: RolloutEvaluator
     missed: tuple[DroppedCommands, ...] = ()
     without: frozenset[str] = frozenset()
+
+    def as_found(self) -> RolloutEvaluator:
+        """The takes played without the missed poses."""
+        return played_without(self.sent, {(i, m.joint): poses for m in self.missed for i, poses in m.poses.items()})
 
     def without_missed(self, model: RobotModel, residuals: Mapping[int, NDArray[np.float64]]
                        ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
@@ -49,7 +54,7 @@ def reestimate(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Sea
 
 def with_commands_of(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:
     """Takes played as others are, which are the same takes, or as much of them as is looked at."""
-    return [replace(e, take=replace(e.take, commands=o.take.commands)) for e, o in zip(evidence, others)]
+    return [e.played(o.take.commands) for e, o in zip(evidence, others)]
 
 
 def _poses(missed: Sequence[DroppedCommands]) -> Mapping[str, Mapping[int, tuple[int, ...]]]:

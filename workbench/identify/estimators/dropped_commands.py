@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from workbench.effects.registry import effect_named, estimated_by
-from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, end_of, played_without, steps
+from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, ends_of, played_without, steps
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence, joint_error
 from workbench.identify.results.findings import Change, Estimate, Finding
@@ -90,7 +90,7 @@ def with_dropped_commands(
         least = least_explained(evaluator, {i: len(k) for i, k in lost.items()})
         if least is None or count > READ_OFF.most_dropped * of:
             continue
-        if all(stands_at_an_end(evaluator.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
+        if stands_at_an_end(evaluator.evidence, joint, lost):
             continue
         here = [i for i, k in lost.items() if k]
         was, now = (float(sum(np.nansum(np.square(r[i][:, evaluator.evidence[i].columns(joint)])) for i in here))
@@ -135,16 +135,24 @@ def least_explained(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> f
     return (READ_OFF.dropped_explains_free if fixed else READ_OFF.dropped_explains) if sum(missed.values()) > 1 else None
 
 
-def stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
-    """Whether a pose that seems missed asks for more than the joint ever went, and the joint stands there: it may be stopped."""
-    e = evidence[i]
-    assert e.take.commands is not None
-    goal = float(e.take.commands.goals[k, e.take.commands.column(joint)])
-    seen = _observed_angle(e, joint)
-    stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
-    way = 1.0 if goal > stood else -1.0
-    end = max(float(np.nanquantile(way * _observed_angle(other, joint), 0.995)) for other in evidence if joint in other.joints)
-    return way * goal > end and way * stood > end - READ_OFF.at_stop
+def stands_at_an_end(evidence: Sequence[TakeEvidence], joint: str, lost: Mapping[int, Sequence[int]]) -> bool:
+    """Whether each pose that seems missed, by take, asks for more than the joint ever went, and the joint stands there: it may be
+    stopped."""
+    ends: dict[float, float] = {}  # by direction, as far as the joint went
+    for i, poses in lost.items():
+        commands = evidence[i].take.commands
+        assert commands is not None
+        seen, frames = _observed_angle(evidence[i], joint), _at_the_end(evidence[i])
+        for k in poses:
+            goal, last = float(commands.goals[k, commands.column(joint)]), seen[frames[k]]
+            stood = float(np.median(last[np.isfinite(last)]))
+            way = 1.0 if goal > stood else -1.0
+            if way not in ends:
+                went = (way * _observed_angle(e, joint) for e in evidence if joint in e.joints)
+                ends[way] = max(float(np.nanquantile(angle, 0.995)) for angle in went)
+            if not (way * goal > ends[way] and way * stood > ends[way] - READ_OFF.at_stop):
+                return False
+    return True
 
 
 def _observed_angle(e: TakeEvidence, joint: str) -> Array:
@@ -152,11 +160,12 @@ def _observed_angle(e: TakeEvidence, joint: str) -> Array:
     return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
 
-def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
-    """The last frames before the next command comes; after the last, all from then on."""
-    assert e.take.commands is not None
-    time, end = e.take.recorded.since_start, end_of(e, k)
-    return np.asarray((time > end - 0.06) & ((time <= end) | (k + 1 == len(e.take.commands.times))))
+def _at_the_end(e: TakeEvidence) -> Sequence[slice]:
+    """By command, the last frames before the next one comes; after the last, all from then on."""
+    time, ends = e.since, ends_of(e)
+    first, after = (np.searchsorted(time, t, side="right") for t in (ends - 0.06, ends))
+    after[-1:] = len(time)
+    return [slice(a, b) for a, b in zip(first.tolist(), after.tolist())]
 
 
 def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> tuple[int, ...]:
@@ -164,29 +173,33 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
     none until the joint reaches a goal again: the model received a command that the joint did not."""
     commands = e.take.commands
     assert commands is not None
-    column, i = commands.column(joint), e.channels.index(joint)
-    seen = _observed_angle(e, joint)
+    i, known = e.channels.index(joint), set(gone)
+    seen, frames = _observed_angle(e, joint), _at_the_end(e)
     said = seen - residual[:, i] * e.sigma[i]
     at, missed, alike = 0.0, list[int](), True
-    for k, goal in enumerate(commands.goals[:, column]):
-        way = float(goal - at)
-        frames = _at_the_end_of(e, k) & np.isfinite(seen)
-        if k in gone:
+    for k, goal in enumerate(commands.goals[:, commands.column(joint)].tolist()):
+        if k in known:
             continue
-        if abs(way) < READ_OFF.least_step or not frames.any():
-            at = float(goal)
+        way, good = goal - at, np.isfinite(seen[frames[k]])
+        if abs(way) < READ_OFF.least_step or not good.any():
+            at = goal
             continue
-        went, should = (float(np.median(q[frames]) - at) / way for q in (seen, said))
-        if alike and abs(went) < READ_OFF.stayed and should > READ_OFF.went:
+        went = _middle(seen, frames[k], good, at) / way
+        if alike and abs(went) < READ_OFF.stayed and _middle(said, frames[k], good, at) / way > READ_OFF.went:
             missed.append(k)
             alike = False
         else:
-            at = float(goal)
+            at = goal
             alike = alike or abs(went - 1) < READ_OFF.stayed
     return tuple(missed)
 
 
+def _middle(angle: Array, frames: slice, good: NDArray[np.bool_], since: float) -> float:
+    """The median way of a joint in the good ones of some frames [rad], from where it was."""
+    return float(np.median(angle[frames][good]) - since)
+
+
 def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
     """How many poses would have moved a joint, as it was seen to do or not."""
-    seen = np.isfinite(_observed_angle(e, joint))
-    return sum(k in gone or bool((_at_the_end_of(e, k) & seen).any()) for k in {*steps(e, joint, gone), *gone})
+    seen, frames, missed = np.isfinite(_observed_angle(e, joint)), _at_the_end(e), set(gone)
+    return sum(k in missed or bool(seen[frames[k]].any()) for k in {*steps(e, joint, gone), *missed})

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
 from workbench.identify.options import READ_OFF
@@ -33,11 +34,11 @@ def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], S
     return evaluator.on(evidence)
 
 
-def end_of(e: TakeEvidence, k: int) -> float:
-    """When the next command comes [s]."""
+def ends_of(e: TakeEvidence) -> Array:
+    """By command, when the next one comes [s]."""
     commands = e.take.commands
     assert commands is not None
-    return float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end)
+    return np.append(commands.times[1:], [commands.end] * bool(len(commands.times)))
 
 
 def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]) -> DroppedPoses:
@@ -51,8 +52,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
             break
         both = {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}
         after = _residuals_without(evaluator, nominal, both, residuals)
-        guilty = {(i, j): tuple(k for k in poses if _is_explained(evaluator.evidence[i], j, k, now[i], after[i]))
-                  for (i, j), poses in new.items()}
+        guilty = {(i, j): explained(evaluator.evidence[i], j, poses, now[i], after[i]) for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
         found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
         if not found:
@@ -80,7 +80,7 @@ def suspects(
         for joint in e.joints if e.take.commands is not None else ():
             gone = lost.get((i, joint), ())
             moves = steps(e, joint, gone)
-            behind = tuple(k for k, way in moves.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
+            behind = _lagging(e, joint, {k: way for k, way in moves.items() if (i, joint, k) not in cleared}, now[i])
             if behind and len(behind) + len(gone) <= READ_OFF.most_dropped_in_motion * (len(moves) + len(gone)):
                 out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
     return out
@@ -90,32 +90,45 @@ def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     """Poses that move a joint and that it received, and the change of its goal [rad]."""
     commands = e.take.commands
     assert commands is not None
-    column = commands.column(joint)
+    column, missed = commands.column(joint), set(gone)
     ways = np.diff(without_poses(commands, column, gone).goals[:, column], prepend=0.0)
-    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= READ_OFF.least_step and k not in gone}
+    return {k: float(ways[k]) for k in np.flatnonzero(np.abs(ways) >= READ_OFF.least_step).tolist() if k not in missed}
 
 
-def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) -> bool:
-    """Whether a joint was well when a command came, and stays behind until the next does."""
-    own = -np.sign(way) * residual[:, e.channels.index(joint)]
-    came, until = _between(e, k)
-    time = e.take.recorded.since_start
-    was, then = own[(time > came - READ_OFF.before) & (time <= came)], own[(time > came) & (time <= until)]
-    was, then = was[np.isfinite(was)], then[np.isfinite(then)]
-    return bool(len(then)) and bool(np.all(np.abs(was) < READ_OFF.calm)) and bool(then.max() > max(READ_OFF.behind, -then.min()))
+def _lagging(e: TakeEvidence, joint: str, moves: Mapping[int, float], residual: Array) -> dict[int, None]:
+    """Of the poses that move a joint, in their order, those before which it was well, and after which it stays behind until the
+    next comes."""
+    error = residual[:, e.channels.index(joint)]
+    before, came, until = _frames(e)
+    out: dict[int, None] = {}
+    for k, way in moves.items():
+        was, then = (-np.sign(way) * error[a:b] for a, b in ((before[k], came[k]), (came[k], until[k])))
+        was, then = was[np.isfinite(was)], then[np.isfinite(then)]
+        if len(then) and np.all(np.abs(was) < READ_OFF.calm) and then.max() > max(READ_OFF.behind, -then.min()):
+            out[k] = None
+    return out
 
 
-def _is_explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
-    """Whether a joint goes as recorded without a pose, until the next came."""
-    came, until = _between(e, k)
-    time, channel = e.take.recorded.since_start, e.channels.index(joint)
-    own = (time > came) & (time <= until) & np.isfinite(before[:, channel])
-    was, now = (float(np.sum(r[own, channel] ** 2)) for r in (before, after))
-    return bool(was - now > READ_OFF.pose_explains * (was - own.sum()))
+def explained(e: TakeEvidence, joint: str, poses: Sequence[int], before: Array, after: Array) -> tuple[int, ...]:
+    """Of these poses, those without which a joint goes as recorded until the next came. before, after: residuals of the take with
+    and without all of them."""
+    channel = e.channels.index(joint)
+    _, came, until = _frames(e)
+    out = []
+    for k in poses:
+        had, has = (r[came[k]:until[k], channel] for r in (before, after))
+        own = np.isfinite(had)
+        was, now = (float(np.sum(r[own] ** 2)) for r in (had, has))
+        if was - now > READ_OFF.pose_explains * (was - own.sum()):
+            out.append(k)
+    return tuple(out)
 
 
-def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
-    """When a command arrived [s], and until when its effect can be seen alone."""
-    commands = e.take.commands
+def _frames(e: TakeEvidence) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.int_]]:
+    """By command, three frames: from the first on a joint shows how it went before, from the second on what the command does,
+    alone until the third."""
+    commands, time = e.take.commands, e.since
     assert commands is not None
-    return float(commands.times[k]), end_of(e, k) + READ_OFF.lag
+    instants = (commands.times - READ_OFF.before, commands.times, ends_of(e) + READ_OFF.lag)
+    before, came, until = (np.searchsorted(time, t, side="right") for t in instants)
+    return before, came, until

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from workbench.identify.evidence.fit import Fitted
-from workbench.identify.evidence.holdout import folds_of, vetoed
-from workbench.identify.evidence.nested import told_from_nothing
+from workbench.identify.evidence.holdout import folds_of, veto
+from workbench.identify.evidence.nested import improbable_effects
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.region import Region
@@ -37,22 +37,23 @@ def checks(pool: Sequence[Candidate], evidence: Sequence[TakeEvidence], options:
         return [at_their_end(f.best.hypothesis, pool) for f in found]
 
     def more_than_nothing(rollouts: Rollouts, found: Sequence[Found]) -> list[Refuted]:
-        said = lockstep(rollouts, {k: told_from_nothing(f.region, options, f.best) for k, f in enumerate(found)})
-        return [said[k] for k in range(len(found))]
+        objections = lockstep(rollouts, {k: improbable_effects(f.region, options, f.best) for k, f in enumerate(found)})
+        return [objections[k] for k in range(len(found))]
 
     def kept_back(rollouts: Rollouts, found: Sequence[Found]) -> list[Refuted]:
         progress("takes kept back", None)
         folds = [folds_of(evidence, [p.take for p in f.region.parts]) for f in found]
-        said = lockstep(rollouts, {k: vetoed(f.region, options, f.best, fold) for k, (f, fold) in enumerate(zip(found, folds))
-                                   if f.best.hypothesis.effects and fold})
-        return [{c: SpokenAgainst(-gain) for c, gain in said.get(k, {}).items()} for k in range(len(found))]
+        fits = {k: veto(f.region, options, f.best, fold) for k, (f, fold) in enumerate(zip(found, folds))
+                if f.best.hypothesis.effects and fold}
+        objections = lockstep(rollouts, fits)
+        return [{c: SpokenAgainst(-gain) for c, gain in objections.get(k, {}).items()} for k in range(len(found))]
 
     return plausible, more_than_nothing, kept_back
 
 
-def refuted(tried: Sequence[Check], rollouts: Rollouts, found: Sequence[Found]) -> list[Refuted]:
+def refute(tried: Sequence[Check], rollouts: Rollouts, found: Sequence[Found]) -> list[Refuted]:
     """Result of the first check that refutes anything; empty where none does."""
-    return next((said for said in (check(rollouts, found) for check in tried) if any(said)), [])
+    return next((objections for objections in (check(rollouts, found) for check in tried) if any(objections)), [])
 
 
 def drifts(region: Region, fit: Fitted, evidence: Sequence[TakeEvidence]) -> list[Drift]:

@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.evidence.checks import checks, drifts, refuted
+from workbench.identify.evidence.checks import checks, drifts, refute
 from workbench.identify.evidence.explanation import Explanation
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
+from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, regress
 from workbench.identify.evidence.nuisance import uncertain_numbers, uncertain_since
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
@@ -50,15 +50,16 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 and options.most else []
     most_work = math.inf if problem.thorough else options.most_work
-    robot, rejected = _searched(Rollouts.of(evaluator, nominal, regions, most_work), shared, felt, options, progress)
+    robot, rejected = _search(Rollouts.of(evaluator, nominal, regions, most_work), shared, felt, options, progress)
     rollouts, found, rejected = robot.rollouts, robot.found, [*by_registers, *rejected]
     tried = checks(felt, evidence, options, progress)
     for _ in range(NUMERICS.rounds):
-        said = refuted(tried, rollouts, found)
-        if not said:
+        objections = refute(tried, rollouts, found)
+        if not objections:
             break
-        rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
-        left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
+        rejected += [Rejected(c.name, c.where, why) for gone in objections for c, why in gone.items()]
+        fits = {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, objections)) if gone}
+        left = lockstep(rollouts, fits)
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = continue_search(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
@@ -68,17 +69,17 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         ties = lockstep(with_best(rollouts, found), {k: fits_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
         found = tuple(f if (tie := ties[k]) is None else with_fits(f, tie.names, options) for k, f in enumerate(found))
         progress("an unnamed torque", None)
-        rollouts, found = _beside_unnamed(with_best(rollouts, found), found, options)
+        rollouts, found = _add_unnamed(with_best(rollouts, found), found, options)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, last.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
-    finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
+    finishing = {k: _finish(f, entire[k], options) for k, f in enumerate(found)}
     fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=last, regions=entire, errors=step_errors(last, entire))
     done = lockstep(fine, finishing)
     found = tuple(done[k] for k in range(len(found)))
     fine = with_best(fine, found)
     everywhere = Whole(fine, (), options)
-    together = everywhere.fitted(everywhere.start([f.best for f in found]))
+    together = everywhere.fit(everywhere.start([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, last.evidence))
@@ -87,8 +88,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
                        tuple(ties.get(k) for k in range(len(found))))
 
 
-def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,
-              progress: Progress) -> tuple[RobotFound, list[Rejected]]:
+def _search(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,
+            progress: Progress) -> tuple[RobotFound, list[Rejected]]:
     """Joints and robot searched; again where an effect of the whole robot went as far as is plausible."""
     rejected: list[Rejected] = []
     for _ in range(NUMERICS.rounds):
@@ -101,7 +102,7 @@ def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Can
     return robot, rejected
 
 
-def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> tuple[Rollouts, tuple[Found, ...]]:
+def _add_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> tuple[Rollouts, tuple[Found, ...]]:
     """The models of each joint, with those that have an unnamed torque there: found on windows, judged as the others are."""
     laws = {k: torque_law(f.region.joints[0], rollouts.evaluator.evidence, rollouts.nominal, options.law)
             for k, f in enumerate(found)}
@@ -124,15 +125,16 @@ def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, p
     return region_of([joint], evidence, numbers, _acting(pool, joint, nominal), options)
 
 
-def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:
+def _finish(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:
     """The best fit with the last numbers, from all that is used; among the others it stays as likely as the search found it."""
     best = found.best
     (r,) = yield [best.hypothesis]
-    region = entire.correlated(found.region.likelihood.tau)
+    region = entire.with_correlation_time(found.region.likelihood.tau)
     s = region.likelihood.discrepancy(r)
-    fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
-    fit = yield from regressed(region, options, fit)
-    fit = replace(fit, beside=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit: Fitted = yield from fit_hypothesis(region, options, best.hypothesis, s, options.iterations, r)
+    fit = yield from regress(region, options, fit)
+    fit = replace(fit, law_slopes=(yield from slopes_by_law(options, fit)), log_evidence=best.log_evidence,
+                  log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

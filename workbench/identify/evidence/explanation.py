@@ -12,10 +12,11 @@ import numpy as np
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
-from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
-from workbench.identify.evidence.recalibration import what_changed
-from workbench.identify.evidence.step_errors import extrapolated
+from workbench.identify.evidence.hypothesis import ZERO
+from workbench.identify.evidence.leftover import list_leftover
+from workbench.identify.evidence.nuisance import as_mapping, mixing, turned_horn, widen, with_known
+from workbench.identify.evidence.recalibration import list_changes
+from workbench.identify.evidence.step_errors import extrapolate
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
 from workbench.identify.options import CONCLUSIONS, PROBLEM
@@ -68,9 +69,9 @@ class Explanation:
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """Gravity over torque where it is not as told, with the effects that could be it."""
         weighed = len({repr(e.take.spec.load) for e in self.looked_at}) > 1
-        said = (gravity_over_torque(region, self.options, p, fits, weighed)
+        ties = (gravity_over_torque(region, self.options, p, fits, weighed)
                 for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.of_tie))
-        return tuple(s for s in said if s is not None)
+        return tuple(s for s in ties if s is not None)
 
     @property
     def model(self) -> RobotModel:
@@ -84,14 +85,14 @@ class Explanation:
         for region, p in zip(self.rollouts.regions, self.posteriors):
             numbers = p.best.hypothesis.numbers
             n, covariance = len(numbers), p.best.covariance(region, self.options)
-            model = with_known(model, numbers, widened(covariance[:n, :n], self.options.formal))
+            model = with_known(model, numbers, widen(covariance[:n, :n], self.options.formal))
         return model
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
         return tuple(r for p in self.posteriors
-                     for r in what_changed(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
+                     for r in list_changes(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The likeliest model's effects, the surest first."""
@@ -132,7 +133,7 @@ class Explanation:
         out = []
         for region, p in zip(self.rollouts.regions, self.posteriors):
             law = p.best.hypothesis.law
-            if law is None or p.best.beside is None:
+            if law is None or p.best.law_slopes is None:
                 continue
             spread = law.spread(CONCLUSIONS.wider**2 * weights_covariance(p.best, region, self.options))
             fit, validation = (change(evidence, (law.joint,), before, after, use) for use in ("fit", "validate"))
@@ -199,28 +200,29 @@ class Explanation:
         steps = (2 * PROBLEM.fine, PROBLEM.fine)
         longer, shorter = evaluator.residuals([RolloutRequest(self.model, everywhere, step) for step in steps])
         floors = {i: np.nan_to_num(rms((longer[i] - shorter[i])[evidence[i].moving])) for i in everywhere}
-        return {i: extrapolated(longer[i], shorter[i]) for i in everywhere}, floors
+        return {i: extrapolate(longer[i], shorter[i]) for i in everywhere}, floors
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, with their worst event, and parameters that drift within a take."""
-        return (*left_over(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
+        return (*list_leftover(evidence, after, floors), *(d.as_unexplained(evidence) for d in self.drifts))
 
     def is_slight(self) -> bool:
-        """All frames were searched: what got no name is no gap, unless it shows."""
+        """Whether what is left is too slight to be a gap: all frames were searched, so that only an unexplained residual is
+        one."""
         return True
 
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
         """Effects that were fitted and are not in the likeliest model, with the nats by which the best model with them is
         behind."""
         out = list(self.refuted)
-        said = {(r.effect, r.where) for r in out}
+        listed = {(r.effect, r.where) for r in out}
         for p, found in zip(self.posteriors, self.found):
             kept = {(c.name, c.where) for c in p.best.hypothesis.effects}
             for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior):
                 for c in f.hypothesis.effects:
-                    if (c.name, c.where) in kept | said:
+                    if (c.name, c.where) in kept | listed:
                         continue
-                    said.add((c.name, c.where))
+                    listed.add((c.name, c.where))
                     behind = p.best.log_posterior - f.log_posterior
                     out.append(Rejected(c.name, c.where, LessLikely(behind)))
         return tuple(out)

@@ -26,8 +26,8 @@ Asks = Generator[list[Hypothesis], list[Array], T]
 @dataclass(frozen=True)
 class Fitted:
     """r (n,): residuals [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of the set of
-    effects; too_much (k, k): apparent information in J that is only noise of J, where that is known; beside (n, m): of r by the
-    weights of an unnamed torque, where it has one."""
+    effects; noise_information (k, k): apparent information in J that is only noise of J, where that is known; law_slopes (n, m):
+    of r by the weights of an unnamed torque, where it has one."""
 
     hypothesis: Hypothesis
     r: Array = field(repr=False)
@@ -35,31 +35,31 @@ class Fitted:
     discrepancy: float
     log_evidence: float
     log_prior: float
-    too_much: Array | None = field(default=None, repr=False)
-    beside: Array | None = field(default=None, repr=False)
+    noise_information: Array | None = field(default=None, repr=False)
+    law_slopes: Array | None = field(default=None, repr=False)
 
     @property
     def log_posterior(self) -> float:
-        """But for a constant [nats]."""
+        """Logarithm of the posterior, up to a constant [nats]."""
         return self.log_evidence + self.log_prior
 
     def covariance(self, region: Region, options: EvidenceOptions) -> Array:
-        """Of theta (k, k)."""
+        """Covariance of theta (k, k)."""
         h, likelihood = self.hypothesis, region.likelihood
         H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
-        if self.too_much is not None:
-            told, axes = np.linalg.eigh(H - self.too_much)
-            H = (axes * np.maximum(told, 0.0)) @ axes.T
+        if self.noise_information is not None:
+            eigenvalues, axes = np.linalg.eigh(H - self.noise_information)
+            H = (axes * np.maximum(eigenvalues, 0.0)) @ axes.T
         H = H + np.diag(Prior.of(h, options).precision(h.theta))
-        if self.beside is not None and h.law is not None:  # what the weights could take over is not known
-            W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.beside
-            taken = np.linalg.solve(self.beside.T @ W + np.diag(h.law.precision), W.T @ self.J)
+        if self.law_slopes is not None and h.law is not None:  # what the weights could take over is not known
+            W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.law_slopes
+            taken = np.linalg.solve(self.law_slopes.T @ W + np.diag(h.law.precision), W.T @ self.J)
             H = _at_least(H - (self.J.T @ W) @ taken, Prior.of(h, options).precision(h.theta))
         return np.asarray(np.linalg.inv(H))
 
 
 def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
-    """Of each set of effects the likelier fit."""
+    """The likelier fit of each set of effects."""
     out = dict(fits)
     for f in more:
         out[f.hypothesis.key] = max(f, out.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
@@ -67,10 +67,10 @@ def with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key,
 
 
 def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> Array:
-    """Of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
+    """Covariance of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
     assert f.hypothesis.law is not None
-    assert f.beside is not None
-    A = np.hstack([f.J, f.beside])
+    assert f.law_slopes is not None
+    A = np.hstack([f.J, f.law_slopes])
     P = np.concatenate([Prior.of(f.hypothesis, options).precision(f.hypothesis.theta), f.hypothesis.law.precision])
     H = (A.T * region.likelihood.precision(f.r, f.discrepancy)) @ A + np.diag(P)
     return np.asarray(np.linalg.inv(H)[f.J.shape[1]:, f.J.shape[1]:])
@@ -79,25 +79,26 @@ def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> A
 def _at_least(H: Array, prior: Array) -> Array:
     """Information (k, k) that is nowhere less than the prior's (k,)."""
     scale = np.sqrt(prior)
-    told, axes = np.linalg.eigh(H / np.outer(scale, scale))
-    return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(told, 1.0)) @ axes.T))
+    eigenvalues, axes = np.linalg.eigh(H / np.outer(scale, scale))
+    return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(eigenvalues, 1.0)) @ axes.T))
 
 
-def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:
-    """A hypothesis with its evidence, where it stands. beside (n, m): slopes by the weights of its unnamed torque."""
+def evaluate(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, law_slopes: Array | None = None
+             ) -> Fitted:
+    """A hypothesis with its evidence at its own parameters. law_slopes (n, m): slopes by the weights of its unnamed torque."""
     prior = Prior.of(h, options)
     density, precision, slopes = prior.log(h.theta), prior.precision(h.theta), J
     parts = len(h.effects) + sum(len(c.options) for c in h.effects)
-    if h.law is not None and beside is not None:
+    if h.law is not None and law_slopes is not None:
         density, precision = density + h.law.log_prior, np.concatenate([precision, h.law.precision])
-        slopes, parts = np.hstack([J, beside]), parts + len(h.law.scales)
+        slopes, parts = np.hstack([J, law_slopes]), parts + len(h.law.scales)
     log, s = region.likelihood.evidence(r, slopes, density, precision)
     odds = parts * log_odds(len(region.candidates), options.expected)
-    return Fitted(h, r, J, s, log, odds, beside=beside)
+    return Fitted(h, r, J, s, log, odds, law_slopes=law_slopes)
 
 
-def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
-            J: Array | None = None) -> Asks[Fitted]:
+def fit_hypothesis(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
+                   J: Array | None = None) -> Asks[Fitted]:
     """Fits a hypothesis from its current parameters, at a discrepancy s. r, J: residuals there and their derivatives by theta, if
     known; else they are requested."""
     prior, seen = Prior.of(start, options), dict[bytes, Array]()
@@ -125,15 +126,15 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
     there = start.at(solved.x)
     left = seen[there.theta.tobytes()]
     J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
-    return judged(region, options, there, left, J_there)
+    return evaluate(region, options, there, left, J_there)
 
 
-def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
+def polish(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
     """A fit continued at its own discrepancy, with new slopes."""
-    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
+    return (yield from fit_hypothesis(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
 
 
-def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
+def regress(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
     """A fit with slopes J by regression on simultaneous moves of all parameters, in both directions, as far as `options.spread`:
     signs of a Hadamard matrix, so that every move informs every parameter (R. Plackett and J. Burman, Biometrika 33, 1946).
 
@@ -156,7 +157,7 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
     for pair in h.alike():
         J[:, pair] = _of_rank_one(J[:, pair], precision)
     scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
-    return replace(f, J=J, too_much=float(precision @ chance) * scatter)
+    return replace(f, J=J, noise_information=float(precision @ chance) * scatter)
 
 
 def _of_rank_one(J: Array, precision: Array) -> Array:
@@ -176,7 +177,7 @@ def slopes(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:
     return np.column_stack([(moved - r) / by for moved, by in zip(left, steps)])
 
 
-def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
+def drop_effects(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
     """A fit's hypothesis without some effects, and its slopes without theirs."""
     keep = list(range(len(f.hypothesis.numbers)))
     for c, s in zip(f.hypothesis.effects, f.hypothesis.slices()):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, side_by_side, without
+from workbench.identify.evidence.fit import Asks, Fitted, drop_effects, fit_hypothesis, side_by_side
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
@@ -34,31 +34,31 @@ def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tup
     return [tuple(takes[k::n]) for k in range(n)]
 
 
-def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]
-           ) -> Asks[dict[Candidate, float]]:
+def veto(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]
+         ) -> Asks[dict[Candidate, float]]:
     """The effects of a fit that held-out takes contradict, with the evidence against each [nats]: log likelihood of the held-out
     takes, of the fit with the effect and without, each fitted to the other takes; summed over the folds that can decide."""
     effects = best.hypothesis.effects
-    said = dict.fromkeys(range(len(effects)), 0.0)
+    gains = dict.fromkeys(range(len(effects)), 0.0)
     for fold in folds:
         seen = region.of_takes([i for i in {p.take for p in region.parts} if i not in fold])
         unseen = region.of_takes(fold)
-        telling = [k for k in range(len(effects)) if _excited(region, seen, best, k)]
+        telling = [k for k in range(len(effects)) if _is_excited(region, seen, best, k)]
         if not telling:
             continue
-        states = [(best.hypothesis, best.J)] + [without(best, lambda c, k=k: c is effects[k]) for k in telling]
+        states = [(best.hypothesis, best.J)] + [drop_effects(best, lambda c, k=k: c is effects[k]) for k in telling]
         fits = yield from side_by_side([_fold(region, seen, options, h, best.discrepancy, J) for h, J in states])
         left = yield [f.hypothesis for f in fits]
         logs = [unseen.likelihood.log(r[region.of(fold)], f.discrepancy) for f, r in zip(fits, left)]
         for k, log in zip(telling, logs[1:]):
-            said[k] += logs[0] - log
-    return {effects[k]: gain for k, gain in said.items() if gain < -options.veto}
+            gains[k] += logs[0] - log
+    return {effects[k]: gain for k, gain in gains.items() if gain < -options.veto}
 
 
 def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: float, J: Array) -> Asks[Fitted]:
     """A fit to the takes that are not held out; its requests are rolled out on all of them."""
     mine = region.of([p.take for p in seen.parts])
-    part = fitting(seen, options, h, s, options.iterations, None, J[mine])  # type: ignore[arg-type]
+    part = fit_hypothesis(seen, options, h, s, options.iterations, None, J[mine])  # type: ignore[arg-type]
     try:
         wants = next(part)
         while True:
@@ -68,9 +68,9 @@ def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: 
         return end.value  # type: ignore[no-any-return]
 
 
-def _excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:
+def _is_excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:
     """Whether the takes that are seen tell enough of an effect."""
     own = best.hypothesis.slices()[k]
-    told = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
-    return bool(told[region.of([p.take for p in seen.parts])].sum() >= EXCITED * told.sum())
+    information = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
+    return bool(information[region.of([p.take for p in seen.parts])].sum() >= EXCITED * information.sum())
 

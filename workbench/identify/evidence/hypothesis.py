@@ -9,13 +9,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import t as student_t
 
+from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.torque_law import TorqueLaw
@@ -25,6 +25,8 @@ FAR = EvidenceOptions.far
 """Limit of a recalibrated constant [standard deviations]: beyond it is a finding, named after the corresponding effect."""
 UNNAMED = "unknown torque"
 """Represents a torque law among the terms of a hypothesis."""
+ZERO = "zero"
+"""Name of a joint's zero among the numbers that are recalibrated."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -47,6 +49,11 @@ class Uncertain:
         """How far one standard deviation moves each number: the logarithm of it, [rad] of ZERO."""
         return {self.name: self.sd, **dict(self.others)}
 
+    @property
+    def effect(self) -> str:
+        """Name of the effect that adds to the same constant, if there is one."""
+        return estimated_by("turn about an axis")[0].name if self.name == ZERO else self.name
+
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
 
@@ -57,7 +64,7 @@ def term_of(c: Candidate) -> Term:
 
 
 def labels_of(c: Candidate) -> list[Label]:
-    """Of the sizes of a candidate, whichever options it has."""
+    """Labels of a candidate's sizes, whichever options it has."""
     fitted = [p.name for p, fixed in zip(c.parameters, c.fixed) if not fixed]
     if len(fitted) != c.size:  # moments, of a mass that swings
         fitted = ["size"] * c.size
@@ -82,29 +89,29 @@ class Hypothesis:
 
     @property
     def z(self) -> Array:
-        """Of the recalibrated numbers."""
+        """The recalibrated numbers (standard deviations from nominal)."""
         return self.theta[:len(self.numbers)]
 
     @property
     def labels(self) -> list[Label]:
-        """Of theta's numbers."""
+        """Labels of theta's numbers."""
         nominal = [("", (n.joint,), n.name, 0) for n in self.numbers]
         return [*nominal, *(label for c in self.effects for label in labels_of(c))]
 
     def slices(self) -> list[slice]:
-        """Of theta, for each effect."""
+        """The part of theta that belongs to each effect."""
         ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def alike(self) -> list[list[int]]:
         """Pairs of theta that represent one constant of the law: its recalibration, and the effect of that name there."""
         at: dict[tuple[str, tuple[str, ...]], int] = {
-            (n.name, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
+            (n.effect, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
         both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
         return [[k, s.start] for k, s in both if k is not None]
 
     def sizes(self) -> list[tuple[Candidate, Array]]:
-        """Each effect with its sizes."""
+        """Each effect with its part of theta."""
         return [(c, self.theta[s]) for c, s in zip(self.effects, self.slices())]
 
     def specs(self) -> list[EffectSpec]:
@@ -112,11 +119,11 @@ class Hypothesis:
         return [c.spec(x) for c, x in self.sizes()]
 
     def at(self, theta: Array) -> Hypothesis:
-        """The same with other numbers."""
+        """The same hypothesis with other numbers theta."""
         return replace(self, theta=np.asarray(theta, dtype=float))
 
     def with_effect(self, c: Candidate, x: Array) -> Hypothesis:
-        """With one effect more; in the place of the same one with other options."""
+        """The hypothesis with one more effect, which replaces the same one with other options."""
         bare = self.without(lambda other: (other.name, other.where) == (c.name, c.where))
         return replace(bare, effects=(*bare.effects, c), theta=np.concatenate([bare.theta, x]))
 
@@ -126,7 +133,7 @@ class Hypothesis:
         return replace(self, effects=tuple(c for c, _ in keep), theta=np.concatenate([self.z, *(x for _, x in keep)]))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of theta."""
+        """Bounds of theta, lower and upper."""
         n = len(self.numbers)
         ends = [(np.full(n, -FAR), np.full(n, FAR)), *(c.bounds() for c in self.effects)]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
@@ -140,13 +147,13 @@ class Prior:
 
     center: Array
     scale: Array
-    normal: NDArray[np.bool_]
-    one_sided: NDArray[np.bool_]
+    normal: Mask
+    one_sided: Mask
     freedom: Array
 
     @classmethod
     def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
-        """Of a hypothesis, whatever its sizes; the same object for the same numbers and effects."""
+        """The prior of a hypothesis, whatever its sizes; the same object for the same numbers and effects."""
         return _prior(len(h.numbers), h.effects, options)
 
     def rows(self, theta: Array) -> Array:
@@ -176,7 +183,7 @@ class Prior:
 
 
 def log_odds(names: int, expected: float) -> float:
-    """By which each effect more is less likely before any data, of so many names, of which `expected` are thought to be there."""
+    """Prior log odds of one more effect [nats], among so many names, of which `expected` are thought to be there."""
     share = min(0.5, expected / max(names, 1))
     return float(np.log(share / (1 - share)))
 
@@ -193,11 +200,11 @@ def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> 
     for c in effects:
         low, high = c.bounds()
         shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
-        told = np.isfinite(seldom)
+        has_usual = np.isfinite(seldom)
         center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
-        width = np.where(told, seldom / furthest, 1.0 if c.read_off else options.width)
+        width = np.where(has_usual, seldom / furthest, 1.0 if c.read_off else options.width)
         scale.append(np.where(shapes, options.doublings, width))
-        freedom.append(np.where(told, options.freedom, 1.0))
+        freedom.append(np.where(has_usual, options.freedom, 1.0))
         normal.append(shapes)
         one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
     return Prior(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))

@@ -23,7 +23,7 @@ FULL = 0.9
 
 
 class _Event(NamedTuple):
-    """From its first instant of the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad,
+    """An event: its first instant on the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad,
     rad/s], and duty, NaN where it was not logged."""
 
     begin: float
@@ -34,7 +34,7 @@ class _Event(NamedTuple):
     duty: float
 
 
-def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+def list_leftover(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels beyond noise, numerics and spread, each with its worst event, the largest first. residuals, floors: over sigma."""
     out = []
     for u in list_unexplained(evidence, residuals, floors):
@@ -50,7 +50,7 @@ def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Re
 
 
 def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
-    """Where the error is largest over a stretch of EVENT."""
+    """The event with the largest error: a stretch as long as EVENT."""
     k = e.channels.index(joint)
     r = residual[:, k] * e.sigma[k]
     n = max(1, round(EVENT / e.frame_time))
@@ -59,10 +59,10 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
         return None
     at = slice(int(np.argmax(power)), int(np.argmax(power)) + n)
     time, q = e.take.recorded.time, e.recorded[:, k]
-    speed, said = np.gradient(q, time), np.gradient(q - r, time)
+    speed, modelled = np.gradient(q, time), np.gradient(q - r, time)
     register = e.take.recording.channels.get(f"duty.{joint}")
     duty = np.full(len(time), np.nan) if register is None else np.interp(time, e.take.recording.time, register)
-    middle = [_middle(x[at]) for x in (q, np.abs(speed), np.abs(said), duty)]
+    middle = [_middle(x[at]) for x in (q, np.abs(speed), np.abs(modelled), duty)]
     return _Event(float(time[at][0]), float(np.sqrt(np.mean(np.square(np.nan_to_num(r[at]))))), *middle)
 
 

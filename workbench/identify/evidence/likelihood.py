@@ -40,7 +40,7 @@ class Likelihood:
 
     @property
     def counts(self) -> Array:
-        """Of how many independent samples each frame is (n,), at most one."""
+        """Number of independent samples that each frame counts as (n,), at most one."""
         return np.asarray(np.minimum(self.span / (2.0 * self.tau), 1.0))
 
     @property
@@ -49,7 +49,7 @@ class Likelihood:
         return float(self.counts.sum())
 
     def scale(self, s: float) -> Array:
-        """Of the residuals (n,) [rad], at a discrepancy s."""
+        """Scale of the residuals (n,) [rad], at a discrepancy s."""
         return np.asarray(np.hypot(self.known, s))
 
     def log(self, r: Array, s: float) -> float:
@@ -65,7 +65,7 @@ class Likelihood:
         return np.asarray(np.copysign(np.sqrt(self.counts * (nu + 1) * np.log1p(np.square(r / self.scale(s)) / nu)), r))
 
     def slope(self, r: Array, s: float) -> Array:
-        """Of `rows` by r (n,)."""
+        """Derivative of `rows` by r (n,)."""
         nu, scale = self.tails, self.scale(s)
         z = np.maximum(np.abs(r / scale), 1e-6)
         return np.asarray(np.sqrt(self.counts * (nu + 1)) * z / (nu + z * z) / np.sqrt(np.log1p(z * z / nu)) / scale)
@@ -97,10 +97,10 @@ class Likelihood:
         return -float(found.fun), float(np.exp(found.x))
 
 
-def correlation_time(parts: list[tuple[Array, float]], window: float = 5.0) -> float:
+def correlation_time(parts: list[tuple[Array, float]]) -> float:
     """Integrated autocorrelation time [s] of residuals, of takes (values with NaN where unseen, time between frames [s])
-    together: half the frame time where frames are independent. Summed until it is `window` correlation times long (A. Sokal,
-    Monte Carlo methods in statistical mechanics, 1997, section 3)."""
+    together: half the frame time where frames are independent. Summed until it is NUMERICS.window correlation times long (A.
+    Sokal, Monte Carlo methods in statistical mechanics, 1997, section 3)."""
     frame = float(np.median([dt for _, dt in parts]))
     longest = max(len(x) for x, _ in parts)
     products, pairs = np.zeros(longest), np.zeros(longest)
@@ -112,7 +112,7 @@ def correlation_time(parts: list[tuple[Array, float]], window: float = 5.0) -> f
     if rho[0] <= 0:
         return frame / 2
     tau = 0.5 + np.cumsum(rho[1:] / rho[0])
-    ends = np.flatnonzero(np.arange(1, len(tau) + 1) >= window * tau)
+    ends = np.flatnonzero(np.arange(1, len(tau) + 1) >= NUMERICS.window * tau)
     return float(frame * max(0.5, tau[ends[0] if len(ends) else -1])) if len(tau) else frame / 2
 
 

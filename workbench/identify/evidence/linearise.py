@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
-from workbench.identify.evidence.fit import Asks, Fitted, judged, slopes
+from workbench.identify.evidence.fit import Asks, Fitted, evaluate, slopes
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 """Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
@@ -60,11 +59,11 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
 
 
 def _neutral(effect: Effect) -> tuple[float, ...]:
-    """Of the numbers of an effect that has options: what vanishes is nothing, what shapes is typical."""
+    """Initial numbers of an effect that has options: those that make the effect are zero, those that shape it are typical."""
     return tuple(p.typical if p.shapes else 0.0 for p in effect.parameters)
 
 
-def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
     """Every extension at some sizes, with the predicted gain at its best one; the best first."""
     asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
@@ -73,10 +72,10 @@ def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list
 
 
 def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:
-    """The same of a hypothesis as it stands, without a fit of it."""
+    """Every extension of a hypothesis as it stands, without a fit of it."""
     (r,) = yield [h]
-    there = judged(region, options, h, r, (yield from slopes(options, h, r)))
-    return there, (yield from linearised(region, options, there))
+    there = evaluate(region, options, h, r, (yield from slopes(options, h, r)))
+    return there, (yield from linearise(region, options, there))
 
 
 def ways(probes: Sequence[Probe]) -> list[list[Probe]]:
@@ -96,7 +95,7 @@ def best_of_each(moves: Sequence[Move]) -> list[Move]:
     return list(out.values())
 
 
-def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
+def choose_moves(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
     """The best moves of one effect, as many as the beam, and as many moves of two effects, but at most two pairs per leading
     effect, since pair predictions are less reliable than the leading effect itself."""
     out, led = list(alone[:options.beam]), Counter[object]()
@@ -138,7 +137,7 @@ def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move)
     return _judged(region, options, f, *led_after(region, options, f, h, r, J, led), (*a.added, two))
 
 
-def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
+def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, Mask]:
     """The fit's slopes in the order of another hypothesis' numbers, 0 of those that it lacks, and which it has."""
     column = dict(zip(f.hypothesis.labels, f.J.T))
     known = np.array([label in column for label in h.labels])
@@ -201,7 +200,7 @@ def _best_along(region: Region, options: EvidenceOptions, f: Fitted, along: Sequ
     return _judged(region, options, f, *best, (c,))
 
 
-def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis, Array, Array, NDArray[np.bool_]]:
+def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis, Array, Array, Mask]:
     """A candidate at sizes x that leave r: with that, slopes, and which numbers may be led after it."""
     h = f.hypothesis.with_effect(c, x)
     J, led = slopes_for(f, h)
@@ -213,7 +212,7 @@ def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis
     return h, r, J, led
 
 
-def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
+def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: Mask
               ) -> tuple[Hypothesis, Array, Array]:
     """A hypothesis whose other parameters are re-optimised linearly, its residuals, and slopes."""
     prior = Prior.of(h, options)
@@ -231,4 +230,4 @@ def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis
 
 def _judged(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, added: tuple[Candidate, ...]
             ) -> Move:
-    return Move(h, r, J, judged(region, options, h, r, J).log_posterior - f.log_posterior, added)
+    return Move(h, r, J, evaluate(region, options, h, r, J).log_posterior - f.log_posterior, added)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import log_ndtr
 
-from workbench.identify.evidence.fit import Asks, Fitted, regressed
+from workbench.identify.evidence.fit import Asks, Fitted, regress
 from workbench.identify.evidence.hypothesis import Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.results.reasons import LessLikely, Reason
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 
-def told_from_nothing(region: Region, options: EvidenceOptions, best: Fitted) -> Asks[dict[Candidate, Reason]]:
+def improbable_effects(region: Region, options: EvidenceOptions, best: Fitted) -> Asks[dict[Candidate, Reason]]:
     """The effects of a fit that are improbable by this ratio and the price of an additional effect."""
     if not best.hypothesis.effects:
         return {}
-    fit = yield from regressed(region, options, best)
+    fit = yield from regress(region, options, best)
     covariance, prior = fit.covariance(region, options), Prior.of(fit.hypothesis, options)
     out: dict[Candidate, Reason] = {}
     for c, own in zip(fit.hypothesis.effects, fit.hypothesis.slices()):

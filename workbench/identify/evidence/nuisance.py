@@ -10,13 +10,12 @@ from functools import lru_cache
 import numpy as np
 
 from workbench.effects.registry import estimated_by
-from workbench.identify.evidence.hypothesis import Uncertain
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance
 from workbench.types import Array
 
-ZERO = "zero"
 ZERO_SD = math.radians(1.15)
 """Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
 it by eye."""
@@ -33,7 +32,8 @@ apart."""
 
 
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
-    """The same of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they drift.
+    """The uncertain numbers of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they
+    drift.
 
     Torque, friction and load friction are known much better together than one by one: their difference lifts an arm. Each
     number returned moves those after it, so that all are independent (Cholesky's factor of the covariance)."""
@@ -58,7 +58,7 @@ def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float 
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 
 
-def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
+def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     """The robot with numbers z standard deviations from nominal; a zero becomes an effect `zero_offset`."""
     servos = {j: model.servo(j) for j in model.joints}
     zeros: list[EffectSpec] = []
@@ -73,7 +73,7 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
 
 
 def changed_by(z: Mapping[Uncertain, float]) -> dict[tuple[str, str], float]:
-    """By joint and name, how far z standard deviations move each number: the logarithm of it, [rad] of ZERO."""
+    """How far z standard deviations move each number, by joint and name: as a logarithm, ZERO in [rad]."""
     out: dict[tuple[str, str], float] = {}
     for number, by in z.items():
         for name, each in number.changes.items():
@@ -99,7 +99,7 @@ def turned_horn(joint: str, angle: float) -> EffectSpec:
 
 
 def nominal_value(servo: ServoConstants, name: str) -> float:
-    """One of UNITS but ZERO, as the nominal law has it."""
+    """The nominal value of one of UNITS, ZERO apart."""
     return float(getattr(servo, name))
 
 
@@ -135,12 +135,12 @@ def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Arra
     return model.with_physics(servos, model.effects)
 
 
-def widened(covariance: Array, by: float) -> Array:
+def widen(covariance: Array, by: float) -> Array:
     """A covariance (k, k) of numbers whose variance was 1 before any data, with the data's information as if errors were `by`
     times as large. Directions of which the data hold no information keep their variance."""
     variances, axes = np.linalg.eigh(covariance)
-    told = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
-    return np.asarray((axes / (1.0 + told / by**2)) @ axes.T)
+    information = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
+    return np.asarray((axes / (1.0 + information / by**2)) @ axes.T)
 
 
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:

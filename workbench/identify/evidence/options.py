@@ -149,14 +149,15 @@ class EvidenceNumerics:
 
     fine: step of the last fits, in steps of the search. rounds: limit of rounds in which implausible or refuted effects are
     removed, and in which effects of the whole robot are searched alongside those of single joints. settled: relative accuracy of
-    a discrepancy's size; a hundred samples determine it to a twentieth. gain [nats]: a fit of all joints ends when a step gains
-    less; shares: fractions of a step that are tried. first: an effect of the whole robot goes first if it explains at least this
-    share of the gain of the best effects of all joints; the complete search of both decides between them.
-    """
+    a discrepancy's size; a hundred samples determine it to a twentieth. window: correlation times over which an autocorrelation
+    is summed (Sokal). gain [nats]: a fit of all joints ends when a step gains less; shares: fractions of a step that are tried.
+    first: an effect of the whole robot goes first if it explains at least this share of the gain of the best effects of all
+    joints; the complete search of both decides between them. """
 
     fine: float = 0.5
     rounds: int = 4
     settled: float = 0.02
+    window: float = 5.0
     gain: float = 0.1
     shares: tuple[float, ...] = (1.0, 0.5, 0.25)
     first: float = 0.5

@@ -19,8 +19,8 @@ Named = tuple[str, tuple[str, ...]]
 
 @dataclass(frozen=True)
 class RegionPosterior:
-    """Of one region. weights: of models within the window, the likeliest first; named: probability that an effect is there;
-    families: that any effect of a family is."""
+    """The posterior of one region. weights: of models within the window, the likeliest first; named: probability that an effect
+    is there; families: that any effect of a family is."""
 
     weights: tuple[tuple[Fitted, float], ...]
     named: Mapping[Named, float]

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.identify.evidence.hypothesis import Uncertain
-from workbench.identify.evidence.nuisance import UNITS, ZERO, changed_by, mixing, nominal_value
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain
+from workbench.identify.evidence.nuisance import UNITS, changed_by, mixing, nominal_value
 from workbench.identify.results.findings import Recalibrated
 from workbench.robot import RobotModel
 
 
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
+def list_changes(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
     """Nominal and recalibrated values, those that went furthest first."""
     sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
     out = []

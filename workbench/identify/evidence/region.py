@@ -47,7 +47,7 @@ class Part:
         return np.asarray((of_take[self.rows][:, self.columns] * self.scale)[self.seen])
 
     def series(self, r: Array) -> list[Array]:
-        """By channel at even times, NaN where unseen; r (n,)."""
+        """Residuals r (n,) as a series at even times for each channel, NaN where unseen."""
         values = np.full(self.seen.shape, np.nan)
         values[self.seen] = r
         whole = np.full((len(self.rows), len(self.columns)), np.nan)
@@ -72,7 +72,7 @@ class Region:
 
     @property
     def takes(self) -> NDArray[np.int_]:
-        """Of which take each residual of `vector` is (n,)."""
+        """The take of each residual of `vector` (n,)."""
         return np.concatenate([np.full(p.size, p.take) for p in self.parts])
 
     def of(self, takes: Sequence[int]) -> Mask:
@@ -88,12 +88,12 @@ class Region:
             at += p.size
         return correlation_time(series)
 
-    def correlated(self, tau: float) -> Region:
+    def with_correlation_time(self, tau: float) -> Region:
         """The region with a correlation time [s]."""
         return replace(self, likelihood=replace(self.likelihood, tau=tau))
 
     def of_takes(self, takes: Sequence[int]) -> Region:
-        """The same judged by some takes alone."""
+        """The region judged by some of its takes."""
         mine = self.of(takes)
         likelihood = replace(self.likelihood, known=self.likelihood.known[mine], span=self.likelihood.span[mine])
         return replace(self, parts=tuple(p for p in self.parts if p.take in takes), likelihood=likelihood)

@@ -40,11 +40,11 @@ def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake],
     typical size is further than `sure` standard errors from the register's value."""
     logs, kept, refuted = registers_of(takes), [], []
     for c in candidates:
-        told = c.effect.in_registers(logs, c.where)
-        if told is None:
+        shown = c.effect.in_registers(logs, c.where)
+        if shown is None:
             kept.append(c)
             continue
-        value, error = told
+        value, error = shown
         reach = abs(value - c.neutral[0]) + options.sure * error
         if reach < options.refuted * abs(c.typical[0] - c.neutral[0]):
             p = c.parameters[0]

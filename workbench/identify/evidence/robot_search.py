@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.identify.evidence.fit import Fitted, judged
+from workbench.identify.evidence.fit import Fitted, evaluate
 from workbench.identify.evidence.hypothesis import Hypothesis
-from workbench.identify.evidence.linearise import linearised
+from workbench.identify.evidence.linearise import linearise
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
 from workbench.identify.evidence.search import (
@@ -68,8 +68,8 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
     else:
         alone, alone_found = continue_search(replace(at.rollouts, shared=start.shared), at.found, options, report)
     of_alone = Whole(alone, (), options)
-    together = of_alone.fitted(of_alone.start([f.best for f in alone_found]))
-    return _weighed(at, RobotFound(alone, alone_found, together), names, options)
+    together = of_alone.fit(of_alone.start([f.best for f in alone_found]))
+    return _choose_state(at, RobotFound(alone, alone_found, together), names, options)
 
 
 def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Progress
@@ -78,10 +78,10 @@ def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate
     report("effects of the whole robot", None)
     whole = Whole(rollouts, tuple(names), options)
     alone = whole.start([f.best for f in found])
-    moves = lockstep(rollouts, {k: linearised(f.region, options, f.best) for k, f in enumerate(found)})
+    moves = lockstep(rollouts, {k: linearise(f.region, options, f.best) for k, f in enumerate(found)})
     by_joints = sum(max(0.0, moves[k][0].gain) if moves[k] else 0.0 for k in range(len(found)))
-    added = whole.predicted(alone)
-    fit = whole.fitted(added) if added is not None and added.log_posterior > alone.log_posterior else None
+    added = whole.predict(alone)
+    fit = whole.fit(added) if added is not None and added.log_posterior > alone.log_posterior else None
     if fit is None or fit.log_posterior <= alone.log_posterior + NUMERICS.first * by_joints:
         return rollouts, tuple(found)
     return _beside(rollouts, [replace(f, fits={}) for f in found], fit)
@@ -94,10 +94,10 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
     for _ in range(NUMERICS.rounds):
         report("effects of the whole robot", None)
         whole = Whole(rollouts, tuple(names), options)
-        now = whole.fitted(whole.start([f.best for f in found]))
+        now = whole.fit(whole.start([f.best for f in found]))
         rollouts, found = _beside(rollouts, found, now)
-        more = whole.predicted(now)
-        added = [whole.fitted(more)] if more is not None and more.log_posterior > now.log_posterior else []
+        more = whole.predict(now)
+        added = [whole.fit(more)] if more is not None and more.log_posterior > now.log_posterior else []
         swaps = _swaps(whole, found, now)
         best = max([now, *added, *(t for _, t in swaps)], key=lambda t: t.log_posterior)
         if best is now or len(best.shared.effects) > NUMERICS.rounds or rollouts.exhausted:
@@ -105,7 +105,7 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
             return RobotFound(rollouts, tuple(found), now, rivals=rivals)
         rollouts, found = continue_search(*_beside(rollouts, found, best), options, report)
     whole = Whole(rollouts, tuple(names), options)
-    return RobotFound(rollouts, tuple(found), whole.fitted(whole.start([f.best for f in found])))
+    return RobotFound(rollouts, tuple(found), whole.fit(whole.start([f.best for f in found])))
 
 
 def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Candidate, Together]]:
@@ -115,8 +115,8 @@ def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Ca
     for k, f in enumerate(found):
         for c in f.best.hypothesis.effects:
             bare = f.fits.get(f.best.hypothesis.without(lambda other, c=c: other is c).key)
-            more = None if bare is None else whole.predicted(whole.start([*now.fits[:k], bare, *now.fits[k + 1:]]))
-            out += [] if more is None else [(c, whole.fitted(more))]
+            more = None if bare is None else whole.predict(whole.start([*now.fits[:k], bare, *now.fits[k + 1:]]))
+            out += [] if more is None else [(c, whole.fit(more))]
     return out
 
 
@@ -127,16 +127,16 @@ def _beside(rollouts: Rollouts, found: Sequence[Found], at: Together) -> tuple[R
     return with_best(replace(rollouts, shared=at.shared), states), states
 
 
-def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], options: EvidenceOptions) -> RobotFound:
+def _choose_state(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], options: EvidenceOptions) -> RobotFound:
     """The more probable state, and the other, both judged by the same correlation times: the shorter, since a poor model's are
     long."""
     taus = [min(a.region.likelihood.tau, b.region.likelihood.tau) for a, b in zip(at.found, alone.found)]
 
     def anew(of: Together, rollouts: Rollouts) -> Together:
-        regions = tuple(r.correlated(tau) for r, tau in zip(rollouts.regions, taus))
+        regions = tuple(r.with_correlation_time(tau) for r, tau in zip(rollouts.regions, taus))
         whole = Whole(replace(rollouts, regions=regions), tuple(names), options)
-        fits: list[Fitted] = [judged(r, options, f.hypothesis, f.r, f.J) for r, f in zip(regions, of.fits)]
-        return whole.judged(of.shared, fits, of.slopes)
+        fits: list[Fitted] = [evaluate(r, options, f.hypothesis, f.r, f.J) for r, f in zip(regions, of.fits)]
+        return whole.evaluate(of.shared, fits, of.slopes)
 
     ours, theirs = anew(at.together, at.rollouts), anew(alone.together, alone.rollouts)
     whole = Whole(at.rollouts, tuple(names), options)
@@ -144,10 +144,10 @@ def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], opti
     for c in at.together.shared.effects:
         left: Hypothesis = at.together.shared.without(lambda other, c=c: other is c)
         fits = at.together.fits
-        bare = whole.judged(left, fits, [np.zeros((len(f.r), len(left.theta))) for f in fits])
-        instead = replace(whole, names=tuple(n for n in names if n.key != c.key)).predicted(whole.fitted(bare))
+        bare = whole.evaluate(left, fits, [np.zeros((len(f.r), len(left.theta))) for f in fits])
+        instead = replace(whole, names=tuple(n for n in names if n.key != c.key)).predict(whole.fit(bare))
         if instead is not None:
-            instead = whole.fitted(instead)
+            instead = whole.fit(instead)
             others.append((instead.shared.effects[-1], instead.log_posterior + ours.log_posterior - at.together.log_posterior))
     if theirs.log_posterior > ours.log_posterior:
         rival = (ours.shared.effects[-1], ours.log_posterior - theirs.log_posterior)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from workbench.identify.evidence.fit import Fitted, judged
+from workbench.identify.evidence.fit import Fitted, evaluate
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.linearise import Probe, led_after, on_lines, points, ways
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
@@ -40,8 +40,8 @@ class Together:
 
 
 class _Blocks(NamedTuple):
-    """Of the information that one region brings. own (k, k): of its numbers, with their prior; mixed (k, m): of these and the
-    shared ones; shared (m, m): of the shared ones, less what its own numbers take (Schur complement); precision (n,): of each
+    """The information that one region brings, in blocks. own (k, k): of its numbers, with their prior; mixed (k, m): of these and
+    the shared ones; shared (m, m): of the shared ones, less what its own numbers take (Schur complement); precision (n,): of each
     frame [1/rad^2]."""
 
     own: Array
@@ -60,15 +60,15 @@ class Whole:
 
     @property
     def regions(self) -> tuple[Region, ...]:
-        """Of the robot."""
+        """The robot's regions."""
         return self.rollouts.regions
 
     def start(self, fits: Sequence[Fitted]) -> Together:
         """Regions with shared effects whose slopes are not known yet."""
         shared = self.rollouts.shared
-        return self.judged(shared, fits, [np.zeros((len(f.r), len(shared.theta))) for f in fits])
+        return self.evaluate(shared, fits, [np.zeros((len(f.r), len(shared.theta))) for f in fits])
 
-    def judged(self, shared: Hypothesis, fits: Sequence[Fitted], slopes: Sequence[Array]) -> Together:
+    def evaluate(self, shared: Hypothesis, fits: Sequence[Fitted], slopes: Sequence[Array]) -> Together:
         """The regions and their shared effects, at the current parameters."""
         prior = Prior.of(shared, self.options)
         S = np.diag(prior.precision(shared.theta))
@@ -80,7 +80,7 @@ class Whole:
         total = sum(f.log_posterior for f in fits) + prior.log(shared.theta) + laplace + price
         return Together(shared, tuple(fits), tuple(slopes), np.asarray(np.linalg.inv(S), dtype=float), total)
 
-    def predicted(self, at: Together) -> Together | None:
+    def predict(self, at: Together) -> Together | None:
         """The best effect more of the whole robot, by lines through rollouts; None where there is none to be added."""
         there = {c.key for c in at.shared.effects}
         asked = [(c, x, k) for c in self.names if c.key not in there for x, k in points(c, at.shared)]
@@ -102,24 +102,24 @@ class Whole:
             value = self._objective(at, shared, [h for h, _, _ in led], [part for _, part, _ in led])
             if value > best[0]:
                 column = (r - none) / (x[k] if k >= 0 and abs(x[k]) > 1e-6 else 1.0)
-                best = (value, self._moved(at, shared, [(h, part) for h, part, _ in led], k, np.split(column, ends)))
+                best = (value, self._move(at, shared, [(h, part) for h, part, _ in led], k, np.split(column, ends)))
         return best[1]
 
-    def _moved(self, at: Together, shared: Hypothesis, led: Sequence[tuple[Hypothesis, Array]], k: int, columns: Sequence[Array]
-               ) -> Together:
-        """With one effect more, which does what `columns` say by its number k."""
-        fits = [judged(region, self.options, h, r, f.J) for region, f, (h, r) in zip(self.regions, at.fits, led)]
+    def _move(self, at: Together, shared: Hypothesis, led: Sequence[tuple[Hypothesis, Array]], k: int, columns: Sequence[Array]
+              ) -> Together:
+        """The regions with one more effect, which does what `columns` say by its number k."""
+        fits = [evaluate(region, self.options, h, r, f.J) for region, f, (h, r) in zip(self.regions, at.fits, led)]
         own, slopes = shared.slices()[-1], []
         for G, column in zip(at.slopes, columns):
             more = np.zeros((len(column), own.stop - own.start))
             if more.shape[1]:
                 more[:, max(k, 0)] = column
             slopes.append(np.hstack([G, more]))
-        return self.judged(shared, fits, slopes)
+        return self.evaluate(shared, fits, slopes)
 
-    def fitted(self, at: Together) -> Together:
-        """All numbers fitted at once, with slopes by differences, those of the regions' own numbers measured once."""
-        at = self._sloped(at)
+    def fit(self, at: Together) -> Together:
+        """Fits all numbers at once, with slopes by differences; those of the regions' own numbers are measured once."""
+        at = self._measure_slopes(at)
         at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], [f.r for f in at.fits])
         for _ in range(self.options.iterations):
             tried = [self._step(at, share) for share in NUMERICS.shares]
@@ -132,8 +132,8 @@ class Whole:
             at = self._rolled_out(at, *tried[best], answers[best])
         return at
 
-    def _sloped(self, at: Together) -> Together:
-        """With the slopes of the regions' own numbers measured where it stands: one number of each region at a time."""
+    def _measure_slopes(self, at: Together) -> Together:
+        """Measures the slopes of the regions' own numbers at the current parameters: one number of each region at a time."""
         each, stride = [f.hypothesis for f in at.fits], self.options.stride
         steps = [np.where(h.theta + stride <= h.bounds()[1], stride, -stride) for h in each]
         most = max(len(h.theta) for h in each)
@@ -141,18 +141,18 @@ class Whole:
         there, *left = self.rollouts.everywhere([(at.shared, hypotheses) for hypotheses in (each, *moved)])
         slopes = [np.reshape([(left[i][k] - r) / step[i] for i in range(len(step))], (len(step), len(r))).T
                   for k, (r, step) in enumerate(zip(there, steps))]
-        fits = [judged(region, self.options, f.hypothesis, r, J)
+        fits = [evaluate(region, self.options, f.hypothesis, r, J)
                 for region, f, r, J in zip(self.regions, at.fits, there, slopes)]
-        return self.judged(at.shared, fits, at.slopes)
+        return self.evaluate(at.shared, fits, at.slopes)
 
     def _rolled_out(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> Together:
-        """Where it stands by rollouts, with slopes by the shared numbers measured there."""
+        """Evaluates the current parameters by rollouts, and measures the slopes of the shared numbers there."""
         _, high = shared.bounds()
         ways = np.where(shared.theta + self.options.stride <= high, self.options.stride, -self.options.stride)
         moved = self.rollouts.everywhere([(shared.at(shared.theta + m), each) for m in np.diag(ways)])
         slopes = [np.reshape([(m[j] - r) / by for m, by in zip(moved, ways)], (len(ways), len(r))).T for j, r in enumerate(left)]
-        fits = [judged(region, self.options, h, r, f.J) for region, f, h, r in zip(self.regions, at.fits, each, left)]
-        return self.judged(shared, fits, slopes)
+        fits = [evaluate(region, self.options, h, r, f.J) for region, f, h, r in zip(self.regions, at.fits, each, left)]
+        return self.evaluate(shared, fits, slopes)
 
     def _step(self, at: Together, share: float) -> tuple[Hypothesis, list[Hypothesis]]:
         """A share of the joint Gauss-Newton step."""
@@ -179,9 +179,9 @@ class Whole:
 
     def _objective(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> float:
         """Log likelihood and prior [nats] at the discrepancies of `at`."""
-        told = (region.likelihood.log(r, f.discrepancy) + Prior.of(h, self.options).log(h.theta)
-                for region, f, h, r in zip(self.regions, at.fits, each, left))
-        return sum(told) + Prior.of(shared, self.options).log(shared.theta)
+        parts = (region.likelihood.log(r, f.discrepancy) + Prior.of(h, self.options).log(h.theta)
+                 for region, f, h, r in zip(self.regions, at.fits, each, left))
+        return sum(parts) + Prior.of(shared, self.options).log(shared.theta)
 
 
 def _within(h: Hypothesis, by: Array) -> Hypothesis:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
-from workbench.identify.evidence.nuisance import as_mapping, recalibrated
+from workbench.identify.evidence.nuisance import as_mapping, recalibrate
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
@@ -41,7 +41,7 @@ class Rollouts:
     @classmethod
     def of(cls, evaluator: RolloutEvaluator, nominal: RobotModel, regions: Sequence[Region], most_work: float = math.inf
            ) -> Rollouts:
-        """With the nominal law standing everywhere."""
+        """Rollouts in which every region has the nominal law."""
         return cls(evaluator, nominal, tuple(regions), tuple(start(r.numbers) for r in regions),
                    step_errors(evaluator, regions), nominal, most_work=most_work)
 
@@ -55,14 +55,14 @@ class Rollouts:
         z: dict[Uncertain, float] = {}
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
-        model = recalibrated(self.nominal, z)
+        model = recalibrate(self.nominal, z)
         for law in (h.law for h in hypotheses if h.law is not None):
             model = law.added_to(model)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
     def around_here(self, step: float, horizon: float | None = None) -> Rollouts:
-        """The same at another step, whose error is measured on the current best model from now on, and over another horizon [s]:
-        fits that are compared have to be rolled out again."""
+        """The same rollouts at another step, whose error is measured on the current best model from now on, and over another
+        horizon [s]: fits that are compared have to be rolled out again."""
         return replace(self, step=step, horizon=self.horizon if horizon is None else horizon, reference=self.model(self.standing))
 
     def everywhere(self, states: Sequence[tuple[Hypothesis, Sequence[Hypothesis]]]) -> list[tuple[Array, ...]]:
@@ -91,12 +91,12 @@ class Rollouts:
         return out
 
     def _residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-        """In the limit of a step of zero."""
+        """Residuals in the limit of a step of zero."""
         wrong = self.errors.at(self.reference, self.step, self.horizon) if questions else {}
         return [{i: r - wrong[i] for i, r in answer.items()} for answer in self.evaluator.uncorrected(questions)]
 
 
 def step_errors(evaluator: RolloutEvaluator, regions: Sequence[Region]) -> StepErrors:
-    """Of the takes that regions look at."""
+    """Step errors of the takes that regions use."""
     takes = tuple(sorted({p.take for region in regions for p in region.parts}))
     return StepErrors(takes, evaluator.uncorrected)

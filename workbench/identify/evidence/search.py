@@ -9,9 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.fit import Asks, Fitted, Key, fitting, judged, polished, side_by_side, with_better, without
+from workbench.identify.evidence.fit import (
+    Asks,
+    Fitted,
+    Key,
+    drop_effects,
+    evaluate,
+    fit_hypothesis,
+    polish,
+    side_by_side,
+    with_better,
+)
 from workbench.identify.evidence.hypothesis import Hypothesis, start
-from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, linearised_around, to_be_fitted
+from workbench.identify.evidence.linearise import Move, best_of_each, choose_moves, in_pairs, linearise, linearised_around
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.fitting.levenberg_marquardt import together
@@ -55,7 +65,7 @@ def recalibrate_nominal(rollouts: Rollouts, options: EvidenceOptions, report: Pr
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
     rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
-    first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
+    first = _all_of(rollouts, [_begin(r, options) for r in rollouts.regions])
     found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
     return with_best(rollouts, found), found
 
@@ -101,39 +111,41 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
 
     def everywhere(part: Callable[[Found], Asks[Found]], these: Collection[int]) -> None:
         nonlocal rollouts, found
-        found = _replaced(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
+        found = _replace(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
         rollouts = with_best(rollouts, found)
 
-    everywhere(lambda f: _renewed(f, options, exploring, True), range(len(found)))
+    everywhere(lambda f: _renew_correlation(f, options, exploring, True), range(len(found)))
     if not exploring:
-        everywhere(lambda f: _refitted(f, options), range(len(found)))
+        everywhere(lambda f: _refit(f, options), range(len(found)))
     open_ = set(range(len(found)))
     for level in range(options.most if not rollouts.exhausted else 0):
         report(f"effects, {what}, level {level + 1}", level / options.most)
         everywhere(lambda f: _level(f, options), open_)
         if not exploring:
-            everywhere(lambda f: _exchanged(f, options), open_)
-        everywhere(lambda f: _renewed(f, options, exploring, len(found) > 1), range(len(found)))  # other joints moved
+            everywhere(lambda f: _exchange(f, options), open_)
+        everywhere(lambda f: _renew_correlation(f, options, exploring, len(found) > 1), range(len(found)))  # other joints moved
         open_ = {i for i in open_ if found[i].goes_on(options)}
         if not open_ or rollouts.exhausted:
             break
     return rollouts, found
 
 
-def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitted]]:
+def _begin(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitted]]:
     """The nominal law recalibrated."""
     h = start(region.numbers)
     (r,) = yield [h]
-    region = region.correlated(min(options.explored, region.correlation(r)))
+    region = region.with_correlation_time(min(options.explored, region.correlation(r)))
     s = region.likelihood.discrepancy(r)
-    fits = yield from side_by_side([fitting(region, options, at, s, options.iterations) for at in _spread(h, options.starts)])
-    better = yield from side_by_side([polished(region, options, f) for f in fits])
-    fit = yield from polished(region, options, max(better, key=lambda f: f.log_posterior))
+    starts = _spread(h, options.starts)
+    fits = yield from side_by_side([fit_hypothesis(region, options, at, s, options.iterations) for at in starts])
+    better = yield from side_by_side([polish(region, options, f) for f in fits])
+    fit = yield from polish(region, options, max(better, key=lambda f: f.log_posterior))
     return region, fit
 
 
 def _spread(h: Hypothesis, starts: int) -> list[Hypothesis]:
-    """Where a plain fit begins: as published, and elsewhere, a standard deviation of every number to one side or the other."""
+    """Starting points of a plain fit: as published, and others, in which every number is a standard deviation away to one side or
+    the other."""
     n = len(h.theta)
     signs = hadamard(1 << max(n, starts).bit_length())[1:starts, 1:n + 1]
     return [h, *(h.at(np.clip(h.theta + row, *h.bounds())) for row in signs)]
@@ -141,50 +153,50 @@ def _spread(h: Hypothesis, starts: int) -> list[Hypothesis]:
 
 def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """The beam's states extended by the moves that predict most, and those fitted."""
-    return (yield from _extended(found, options, found.beam(options), options.refined))
+    return (yield from _extend(found, options, found.beam(options), options.refined))
 
 
-def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
+def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """If the best fit cannot be extended to a better one: drops each of its effects in turn, fitted from the current parameters,
     so that a poorly converged smaller model does not justify an extra effect; and exchanges each for others."""
     if found.best.hypothesis.key not in found.extended:
         return found
     best, region = found.best, found.region
-    states = [without(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
-    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J)
+    states = [drop_effects(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
+    made = yield from side_by_side([fit_hypothesis(region, options, h, best.discrepancy, options.iterations, None, J)
                                     for h, J in states])
     fits = with_better(found.fits, made)
-    return (yield from _extended(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
+    return (yield from _extend(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
 
 
-def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that predict most; those are fitted, and the beam polished."""
+def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
+    """Extends states, each by so many of the moves with the largest predicted gain; fits those, and polishes the beam."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     published: dict[Key, Move] = {}
     for f in states:
-        alone = yield from linearised(region, options, f)
+        alone = yield from linearise(region, options, f)
         if not f.hypothesis.effects:
             published = {m.hypothesis.key: m for m in (yield from _from_published(region, options, f))}
             least = dict.fromkeys((m.hypothesis.key for m in alone), -np.inf) | {key: m.gain for key, m in published.items()}
             alone = sorted((replace(m, gain=max(m.gain, least[m.hypothesis.key])) for m in alone), key=lambda m: -m.gain)
         alone, both = ([m for m in each if m.hypothesis.key not in fits]
                        for each in (alone, best_of_each(in_pairs(region, options, f, alone))))
-        moves += [(f, m) for m in to_be_fitted(alone, both, options)[:refined]]
+        moves += [(f, m) for m in choose_moves(alone, both, options)[:refined]]
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from side_by_side([_moved(region, options, f, m, published.get(key)) for key, (f, m) in wanted.items()])
+    made = yield from side_by_side([_fit_move(region, options, f, m, published.get(key)) for key, (f, m) in wanted.items()])
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
-    better = yield from side_by_side([polished(region, options, f) for f in ahead])
-    fits = with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
+    better = yield from side_by_side([polish(region, options, f) for f in ahead])
+    fits = with_better(fits, [*better, *(reduce(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
 
 def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
-    """Every effect alone, predicted around the nominal law as it stands; gains compared with a plain fit f. A plain fit adjusts
-    the law for want of the effect, and predicts its size badly."""
+    """Every effect alone, with its gain predicted around the nominal law as it stands; gains compared with a plain fit f. A plain
+    fit adjusts the law for want of the effect, and predicts its size badly."""
     h = start(region.numbers)
     if not len(h.theta):
         return []
@@ -192,29 +204,30 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
     return [replace(m, gain=m.gain + there.log_posterior - f.log_posterior) for m in moves]
 
 
-def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
+def reduce(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     """A fit without the effects that came to nothing in it: a smaller model must not lose because it was searched for less."""
     def vanished(c: Candidate) -> bool:
         x = f.hypothesis.theta[f.hypothesis.slices()[f.hypothesis.effects.index(c)]]
         return bool(np.allclose(x[~c.shapes], 0.0))  # at the end of its range
 
-    h, J = without(f, vanished)
-    return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
+    h, J = drop_effects(f, vanished)
+    return f if h.key == f.hypothesis.key else evaluate(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move, published: Move | None = None) -> Asks[Fitted]:
+def _fit_move(region: Region, options: EvidenceOptions, f: Fitted, m: Move, published: Move | None = None) -> Asks[Fitted]:
     """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more from the nominal law as it
     stands, with the size that it predicts (published), as a law recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis
-    fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
-                                    fitting(region, options, _as_published(h), f.discrepancy, options.iterations, None,
-                                            None if shaped else m.J) if published is None else
-                                    fitting(region, options, published.hypothesis, f.discrepancy, options.iterations)])
+    s, J = f.discrepancy, None if shaped else m.J
+    fits = yield from side_by_side([
+        fit_hypothesis(region, options, h, s, options.iterations, None, J),
+        fit_hypothesis(region, options, _as_published(h), s, options.iterations, None, J) if published is None else
+        fit_hypothesis(region, options, published.hypothesis, s, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
-def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: bool) -> Asks[Found]:
+def _renew_correlation(found: Found, options: EvidenceOptions, exploring: bool, again: bool) -> Asks[Found]:
     """The fits judged by the correlation time of the closest residuals: the median of a few, as a single estimate is poor.
     again: rolled out again, because other regions have changed, or the step has."""
     near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
@@ -223,30 +236,30 @@ def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: boo
         left = yield [f.hypothesis for f in near]
     closest = sorted(left, key=found.region.likelihood.discrepancy)[:options.beam]
     tau = float(np.median([found.region.correlation(r) for r in closest]))
-    region = found.region.correlated(min(tau, options.explored) if exploring else tau)
-    fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
+    region = found.region.with_correlation_time(min(tau, options.explored) if exploring else tau)
+    fits = {f.hypothesis.key: evaluate(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)
 
 
-def _refitted(found: Found, options: EvidenceOptions) -> Asks[Found]:
+def _refit(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """The most probable fits continued, and repeated from the nominal law, at the finer step and the new correlation time:
     otherwise fits that have not converged there would be compared with fits that have."""
     region, least = found.region, found.best.log_posterior - 3 * options.occam
     near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if f.log_posterior > least][:options.refined]
     made = yield from side_by_side([
-        *(polished(region, options, f) for f in near),
-        *(fitting(region, options, _as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
-    return replace(found, fits=with_better(found.fits, [*made, *(reduced(region, options, f) for f in made)]))
+        *(polish(region, options, f) for f in near),
+        *(fit_hypothesis(region, options, _as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
+    return replace(found, fits=with_better(found.fits, [*made, *(reduce(region, options, f) for f in made)]))
 
 
 def _as_published(h: Hypothesis) -> Hypothesis:
-    """With none of the nominal law's numbers recalibrated."""
+    """The hypothesis with none of the nominal law's numbers recalibrated."""
     return h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
 
 
 def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) -> Found:
-    """With more fits, as far as they are of the same uncertain numbers."""
-    mine = [judged(found.region, options, f.hypothesis, f.r, f.J) for f in fits if f.hypothesis.numbers == found.region.numbers]
+    """The search's result with more fits, as far as they have the same uncertain numbers."""
+    mine = [evaluate(found.region, options, f.hypothesis, f.r, f.J) for f in fits if f.hypothesis.numbers == found.region.numbers]
     return replace(found, fits=with_better(found.fits, mine))
 
 
@@ -264,17 +277,17 @@ def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candi
     """Without all fits that have one of these effects, which are not to be tried again; the best of them is fitted without these
     effects from its current parameters, as there may be no other fit."""
     names, best = {c.key for c in gone}, found.best
-    h, J = without(best, lambda c: c.key in names)
-    fit = yield from fitting(found.region, options, h, best.discrepancy, options.iterations, None, J)
+    h, J = drop_effects(best, lambda c: c.key in names)
+    fit = yield from fit_hypothesis(found.region, options, h, best.discrepancy, options.iterations, None, J)
     fits = {key: f for key, f in found.fits.items() if not any(c.key in names for c in f.hypothesis.effects)}
     region = replace(found.region, candidates=tuple(c for c in found.region.candidates if c.key not in names))
     return replace(found, region=region, fits=with_better(fits, [fit]))
 
 
 def with_best(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
-    """With the best fit of each region as the hypothesis used for it."""
+    """The rollouts with the best fit of each region as its hypothesis."""
     return replace(rollouts, regions=tuple(f.region for f in found), standing=tuple(f.best.hypothesis for f in found))
 
 
-def _replaced(found: Sequence[Found], done: Mapping[int, Found]) -> list[Found]:
+def _replace(found: Sequence[Found], done: Mapping[int, Found]) -> list[Found]:
     return [done.get(i, f) for i, f in enumerate(found)]

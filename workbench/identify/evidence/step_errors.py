@@ -22,7 +22,7 @@ Residuals = Mapping[int, Array]
 Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
 
 
-def extrapolated(longer: Array, shorter: Array) -> Array:
+def extrapolate(longer: Array, shorter: Array) -> Array:
     """Residuals in the limit of a step of zero, from those at one step and at half of it, of the same shape."""
     return np.asarray(2.0 * shorter - longer)
 
@@ -37,14 +37,14 @@ class StepErrors:
     _ideal: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def at(self, model: RobotModel, step: float, horizon: float = np.inf) -> Residuals:
-        """By take the error that a step, in steps of the search, adds to a model's residuals (N, c) [sigma]; 0 where unknown.
-        horizon [s]: of windows."""
+        """The error of each take that a step, in steps of the search, adds to a model's residuals (N, c) [sigma]; 0 where
+        unknown. horizon [s]: of windows."""
         key = (model.sha256, horizon)
         if (*key, step) not in self._known:
             steps = (step,) if key in self._ideal else (step, 2 * PROBLEM.fine, PROBLEM.fine)
             here, *finer = self.roll([RolloutRequest(model, self.takes, s, horizon=horizon) for s in steps])
             if finer:
                 longer, shorter = finer
-                self._ideal[key] = {i: extrapolated(longer[i], shorter[i]) for i in self.takes}
+                self._ideal[key] = {i: extrapolate(longer[i], shorter[i]) for i in self.takes}
             self._known[*key, step] = {i: np.nan_to_num(here[i] - self._ideal[key][i]) for i in self.takes}
         return self._known[*key, step]

@@ -40,8 +40,8 @@ class AsTorque:
     known: float
 
     def covariance(self, formal: Array, size: Array) -> Array:
-        """Of the effect's sizes (k, k): no better known along `size` (k,) than the torques are that do the same, whatever a fit
-        claims (`formal`), as no angle tells the two apart."""
+        """Covariance of the effect's sizes (k, k): no better known along `size` (k,) than the torques are that do the same,
+        whatever a fit claims (`formal`), as no angle tells the two apart."""
         along = size / max(float(np.linalg.norm(size)), 1e-12)
         least = self.similarity * float(size @ size) * (self.known / max(abs(self.by), 1e-6))**2
         return np.asarray(formal + max(0.0, least - float(along @ formal @ along)) * np.outer(along, along))
@@ -61,7 +61,7 @@ def competes(c: Candidate) -> bool:
 
 
 def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate) -> AsTorque | None:
-    """Of a fit's effect; None where it is not of this tie, or no change of torque resembles it."""
+    """A fit's effect as a change of torque; None where it is not of this tie, or no change of torque resembles it."""
     h, prior = f.hypothesis, Prior.of(f.hypothesis, options)
     more = all_torques(h.numbers)
     if c.effect.tied != GRAVITY or not more.any() or not c.size:
@@ -84,7 +84,7 @@ def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate)
 
 
 def all_torques(numbers: Sequence[Uncertain]) -> Array:
-    """By how many standard deviations the numbers (k,) have to move for all torques to grow by a factor of e, and nothing else to
+    """Standard deviations by which the numbers (k,) have to move for all torques to grow by a factor of e, and nothing else to
     change; zero where none of them is a torque."""
     target = np.array([float(n.name in TORQUES) for n in numbers])
     return np.asarray(np.linalg.solve(mixing(numbers), target)) if target.any() else target

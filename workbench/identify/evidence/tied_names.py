@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.identify.conclusions import estimates
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, polished, side_by_side, with_better
+from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish, side_by_side, with_better
 from workbench.identify.evidence.hypothesis import FAR, Hypothesis, Uncertain
-from workbench.identify.evidence.linearise import linearised, linearised_around
+from workbench.identify.evidence.linearise import linearise, linearised_around
 from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
@@ -38,13 +38,15 @@ class Ratio:
         return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
 
     def estimate(self, options: EvidenceOptions) -> Estimate:
-        """With its 90 % interval, as much wider than the fit claims as any number of a servo's law (`EvidenceOptions.formal`)."""
+        """The ratio with its 90 % interval, as much wider than the fit claims as any number of a servo's law
+        (`EvidenceOptions.formal`)."""
         half = CONCLUSIONS.z90 * options.formal * self.sd
         return Estimate(math.exp(self.log), math.exp(self.log - half), math.exp(self.log + half), "1")
 
 
 def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | None:
-    """Of a fit: the torque that it recalibrated, and its effects that do what torques do; None where no torque is uncertain."""
+    """The ratio of gravity to torque in a fit: the torque that it recalibrated, and its effects that act as torques do; None
+    where no torque is uncertain."""
     h = f.hypothesis
     scale = [k for k, n in enumerate(h.numbers) if n.name == SCALE]
     if not scale:
@@ -82,45 +84,47 @@ def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Tie
     named = any(competes(c) for c in f.hypothesis.effects)
     if ratio is None or not members or not (named or ratio.is_apart(options)):
         return None
-    told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
+    published = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
     rest = [(c, x) for c, x in f.hypothesis.sizes() if not competes(c)]
     torque = f
     if len(rest) < len(f.hypothesis.effects):
         alone = Hypothesis(region.numbers, tuple(c for c, _ in rest), np.concatenate([f.hypothesis.z, *(x for _, x in rest)]))
-        torque = yield from fitting(region, options, alone, f.discrepancy, options.iterations)
-        torque = yield from polished(region, options, torque)
-    without = Hypothesis(told.numbers, tuple(c for c, _ in rest), np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)]))
-    fits = yield from _each_alone(told, options, without, f)
+        torque = yield from fit_hypothesis(region, options, alone, f.discrepancy, options.iterations)
+        torque = yield from polish(region, options, torque)
+    sizes = np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)])
+    without = Hypothesis(published.numbers, tuple(c for c, _ in rest), sizes)
+    fits = yield from _each_alone(published, options, without, f)
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
     return TieFits(torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
 
 
-def _each_alone(told: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
+def _each_alone(published: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
     """The likeliest fit of each candidate in addition to a hypothesis, from three starts: the law fitted without it, which is
     distorted for want of it (a zero goes as far as it may where gravity leans); the law as it stands; and that of the fit f,
     which is not distorted where it has another of the candidates."""
-    bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
-    moves = list((yield from linearised(told, options, bare)))
-    as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, told.numbers)]
+    bare = yield from fit_hypothesis(published, options, without, f.discrepancy, options.iterations)
+    moves = list((yield from linearise(published, options, bare)))
+    as_fitted = f.hypothesis.z * [n.sd / t.sd for n, t in zip(f.hypothesis.numbers, published.numbers)]
     for z in (without.z, np.clip(as_fitted, -FAR, FAR)):
-        moves += (yield from linearised_around(told, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
-    fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
-    fits = yield from side_by_side([polished(told, options, g) for g in fits])
+        moves += (yield from linearised_around(published, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
+    fits = yield from side_by_side([
+        fit_hypothesis(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    fits = yield from side_by_side([polish(published, options, g) for g in fits])
     return list(with_better({}, fits).values())
 
 
-def shared_by_tie(f: Finding, told: GravityOverTorque | None) -> Finding:
+def shared_by_tie(f: Finding, tie: GravityOverTorque | None) -> Finding:
     """The finding; where other names of its tie are as likely, within the nats by which fits of one model differ, with its share
     of the tie's probability, which is divided equally among all of these."""
-    if told is None:
+    if tie is None:
         return f
-    near = told.competitive
+    near = tie.competitive
     others = [n for n in near if (n.effect, n.where) != (f.effect, f.where)]
     if not others or len(others) == len(near):
         return f
-    each = min(f.confidence, told.confidence / len(near))
+    each = min(f.confidence, tie.confidence / len(near))
     rival = Alternative(others[0].effect, others[0].where, each)
-    return replace(f, confidence=each, of_tie=told.confidence, alternatives=(rival,))
+    return replace(f, confidence=each, of_tie=tie.confidence, alternatives=(rival,))
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:

@@ -13,14 +13,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.options import LawOptions
 from workbench.identify.rollouts.servo_logs import frames
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo import Instant, ServoLaw
 from workbench.servo.tabled import Tabled
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
@@ -53,22 +52,22 @@ class TorqueLaw:
 
     @cached_property
     def group_of(self) -> tuple[str, ...]:
-        """Of each weight."""
+        """Group of each weight."""
         return tuple(f.group for f in self.functions for _ in range(f.values.shape[1]))
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """All that there could be, in order."""
+        """All possible groups, in order."""
         return tuple(dict.fromkeys(f.group for f in self.functions))
 
     @property
-    def active(self) -> NDArray[np.bool_]:
+    def active(self) -> Mask:
         """Which weights are of groups that are there (M,)."""
         return np.array([g in self.scales for g in self.group_of])
 
     @property
     def precision(self) -> Array:
-        """Of the prior of each active weight [1/(N m)^2]."""
+        """Precision of the prior of each active weight [1/(N m)^2]."""
         return np.array([self.scales[g] ** -2 for g in self.group_of if g in self.scales])
 
     @property
@@ -79,17 +78,17 @@ class TorqueLaw:
         return float(density - len(self.scales) * np.log(self.tried))
 
     def at(self, weights: Array, scales: Mapping[str, float] | None = None) -> TorqueLaw:
-        """With other weights (M,), and other groups."""
+        """The law with other weights (M,), and other groups."""
         scales = self.scales if scales is None else scales
         there = np.array([g in scales for g in self.group_of])
         return replace(self, weights=np.where(there, weights, 0.0), scales=dict(scales))
 
     def moved(self, k: int, by: float) -> TorqueLaw:
-        """With one weight more, whether or not its group is there [N m]."""
+        """The law with one weight changed by so much [N m], whether or not its group is active."""
         return replace(self, weights=self.weights + by * np.eye(len(self.weights))[k])
 
     def tables(self) -> tuple[TorqueTable, ...]:
-        """As a servo has it: one for each quantity that the torque depends on."""
+        """The law as a servo's tables: one for each quantity that the torque depends on."""
         return tuple(TorqueTable(f.depends_on, tuple(f.at.tolist()), tuple((f.values @ self.weights[own]).tolist()))
                      for f, own in self._present())
 
@@ -137,12 +136,12 @@ def torque_law(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel, 
         _radial("angle and direction", "angle and direction", degrees, options.of_angle, options),
         _radial("duty and direction", "duty", np.concatenate([duty, -duty]), options.of_duty, options),
         _radial("duty and direction", "duty and direction", np.abs(duty), options.of_duty, options),
-        _stretched(_radial("speed", "speed", np.arcsinh(np.degrees(speed) / slow), options.of_speed, options), slow))
+        _stretch(_radial("speed", "speed", np.arcsinh(np.degrees(speed) / slow), options.of_speed, options), slow))
     return TorqueLaw(joint, functions, np.zeros(sum(f.values.shape[1] for f in functions)), tried=len(options.shares),
                      full_torque=model.servo(joint).torque_at_full_duty)
 
 
-def _stretched(f: Functions, slow: float) -> Functions:
+def _stretch(f: Functions, slow: float) -> Functions:
     """Functions of arcsinh(speed / slow) as functions of speed: finer about rest."""
     return replace(f, at=slow * np.sinh(f.at))
 

@@ -14,15 +14,23 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, side_by_side, slopes, with_better, without
+from workbench.identify.evidence.fit import (
+    Asks,
+    Fitted,
+    drop_effects,
+    evaluate,
+    fit_hypothesis,
+    side_by_side,
+    slopes,
+    with_better,
+)
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.search import Found
 from workbench.identify.evidence.torque_law import TorqueLaw
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
@@ -47,7 +55,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Predicted:
-    """Where linear algebra leads from a state. r (n,): predicted residuals; log_posterior [nats]."""
+    """The state that linear algebra predicts from another. r (n,): predicted residuals; log_posterior [nats]."""
 
     h: Hypothesis
     r: Array = field(repr=False)
@@ -60,7 +68,7 @@ def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw) -> 
     region, best = found.region, found.best
     bases = [best]
     if best.hypothesis.effects:
-        bare = yield from fitting(region, options, start(region.numbers), best.discrepancy, options.iterations)
+        bare = yield from fit_hypothesis(region, options, start(region.numbers), best.discrepancy, options.iterations)
         bases.append(bare)
     states = []
     for f in bases:
@@ -69,16 +77,16 @@ def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw) -> 
         states.append(_State(h, f.r, f.J, B))
     # the correlation time of the residuals of the most flexible law, as Mallows' Cp takes the noise from the largest model
     flexible = dict.fromkeys(law.groups, max(options.law.shares) * law.full_torque)
-    closest = min(region.correlation(_solved(region, options, at, flexible).r) for at in states)
-    shorter = region.correlated(min(region.likelihood.tau, closest))
-    least = judged(shorter, options, best.hypothesis, best.r, best.J).log_posterior
-    predicted = [_predicted(shorter, options, at).log_posterior for at in states]
+    closest = min(region.correlation(_solve(region, options, at, flexible).r) for at in states)
+    shorter = region.with_correlation_time(min(region.likelihood.tau, closest))
+    least = evaluate(shorter, options, best.hypothesis, best.r, best.J).log_posterior
+    predicted = [_predict_groups(shorter, options, at).log_posterior for at in states]
     if max(predicted) < least - options.law.behind:
         return found
     made: list[Fitted] = []
     for at, nats in zip(states, predicted):
         if nats > least - 3 * options.law.behind:
-            made += yield from _followed(shorter, options, at)
+            made += yield from _follow(shorter, options, at)
     return _with(found, made, options)
 
 
@@ -87,9 +95,9 @@ def on_windows(found: Found, options: EvidenceOptions) -> Asks[Found]:
     over whole logs they hardly do."""
     best = found.best
     (r,) = yield [best.hypothesis]
-    region = found.region.correlated(min(options.explored, found.region.correlation(r)))
+    region = found.region.with_correlation_time(min(options.explored, found.region.correlation(r)))
     J = yield from slopes(options, best.hypothesis, r)
-    fit = judged(region, options, best.hypothesis, r, J)
+    fit = evaluate(region, options, best.hypothesis, r, J)
     return replace(found, region=region, fits={fit.hypothesis.key: fit})
 
 
@@ -100,21 +108,21 @@ def carried_on(found: Found, windows: Found, options: EvidenceOptions) -> Asks[F
     for f in ahead[:options.beam]:
         (r,) = yield [f.hypothesis]
         nothing = np.zeros((len(r), len(f.hypothesis.law.weights)))  # type: ignore[union-attr]
-        at = yield from _measured(options, _State(f.hypothesis, r, nothing[:, :0], nothing))
-        region = found.region.correlated(min(found.region.likelihood.tau, found.region.correlation(r)))
-        at = yield from _fitted(region, options, at, options.law.iterations)
+        at = yield from _measure_slopes(options, _State(f.hypothesis, r, nothing[:, :0], nothing))
+        region = found.region.with_correlation_time(min(found.region.likelihood.tau, found.region.correlation(r)))
+        at = yield from _fit(region, options, at, options.law.iterations)
         made.append(_as_fit(region, options, at))
     return _with(found, made, options)
 
 
 def _with(found: Found, made: Sequence[Fitted], options: EvidenceOptions) -> Found:
-    """With these fits, all judged by the correlation time of the closest ones' residuals; of each set of effects and groups the
-    likelier fit."""
+    """The result with these fits, all judged by the correlation time of the closest ones' residuals; the likelier fit of each set
+    of effects and groups is kept."""
     every = [*found.fits.values(), *(without_zero_groups(f) for f in made)]
     closest = sorted(every, key=lambda f: f.discrepancy)[:options.beam]
     alike = [f.r for f in closest if f.discrepancy < options.grown * closest[0].discrepancy]
-    region = found.region.correlated(float(np.median([found.region.correlation(r) for r in alike])))
-    fits = [judged(region, options, f.hypothesis, f.r, f.J, f.beside) for f in every]
+    region = found.region.with_correlation_time(float(np.median([found.region.correlation(r) for r in alike])))
+    fits = [evaluate(region, options, f.hypothesis, f.r, f.J, f.law_slopes) for f in every]
     return replace(found, region=region, fits=with_better({}, fits))
 
 
@@ -122,21 +130,22 @@ def without_zero_groups(f: Fitted) -> Fitted:
     """A fit without the groups of its law whose weights are all zero, which remain where no step from zero was an improvement;
     without a law if that is all of them."""
     law = f.hypothesis.law
-    if law is None or f.beside is None:
+    if law is None or f.law_slopes is None:
         return f
     used = {g for g, w in zip(law.group_of, law.weights) if w}
     if used == set(law.scales):
         return f
     kept = law.at(law.weights, {g: s for g, s in law.scales.items() if g in used})
     columns = np.isin(np.array(law.group_of)[law.active], list(used))
-    return replace(f, hypothesis=replace(f.hypothesis, law=kept if used else None), beside=f.beside[:, columns] if used else None)
+    return replace(f, hypothesis=replace(f.hypothesis, law=kept if used else None),
+                   law_slopes=f.law_slopes[:, columns] if used else None)
 
 
-def _followed(region: Region, options: EvidenceOptions, at: _State) -> Asks[list[Fitted]]:
+def _follow(region: Region, options: EvidenceOptions, at: _State) -> Asks[list[Fitted]]:
     """A state fitted, then without each of its effects in turn as long as that is likelier: a name that the law makes needless
     was none."""
     made: list[Fitted] = []
-    at = yield from _fitted(region, options, at, options.law.iterations)
+    at = yield from _fit(region, options, at, options.law.iterations)
     now = _as_fit(region, options, at)
     made.append(now)
     while at.h.effects:
@@ -146,7 +155,7 @@ def _followed(region: Region, options: EvidenceOptions, at: _State) -> Asks[list
         k = int(np.argmax([f.log_posterior for f in fits]))
         if fits[k].log_posterior < now.log_posterior - options.law.behind:
             break
-        at = yield from _fitted(region, options, fewer[k], 1)
+        at = yield from _fit(region, options, fewer[k], 1)
         now = _as_fit(region, options, at)
         made.append(now)
     return made
@@ -154,17 +163,17 @@ def _followed(region: Region, options: EvidenceOptions, at: _State) -> Asks[list
 
 def _without(region: Region, options: EvidenceOptions, at: _State, gone: Candidate) -> Asks[_State]:
     """A state without one of its effects, the rest led after that with the slopes that are known."""
-    h, J = without(_as_fit(region, options, at), lambda c: c is gone)
+    h, J = drop_effects(_as_fit(region, options, at), lambda c: c is gone)
     (r,) = yield [h]
-    return (yield from _stepped(region, options, _State(h, r, J, at.B), 2))
+    return (yield from _step(region, options, _State(h, r, J, at.B), 2))
 
 
-def _fitted(region: Region, options: EvidenceOptions, at: _State, iterations: int) -> Asks[_State]:
+def _fit(region: Region, options: EvidenceOptions, at: _State, iterations: int) -> Asks[_State]:
     """Gauss and Newton's steps; after each the slopes are measured again."""
     for _ in range(iterations):
         before = at
-        at = yield from _stepped(region, options, at, 1)
-        at = yield from _measured(options, at)
+        at = yield from _step(region, options, at, 1)
+        at = yield from _measure_slopes(options, at)
         if before.law.scales and _as_fit(region, options, at).log_posterior < _as_fit(region, options, before).log_posterior:
             return before
         if np.array_equal(at.h.theta, before.h.theta) and np.array_equal(at.law.weights, before.law.weights):
@@ -172,10 +181,10 @@ def _fitted(region: Region, options: EvidenceOptions, at: _State, iterations: in
     return at
 
 
-def _stepped(region: Region, options: EvidenceOptions, at: _State, steps: int) -> Asks[_State]:
+def _step(region: Region, options: EvidenceOptions, at: _State, steps: int) -> Asks[_State]:
     """Steps to where linear algebra leads, as far as rollouts agree, with the slopes that are known."""
     for _ in range(steps):
-        p = _predicted(region, options, at)
+        p = _predict_groups(region, options, at)
         assert p.h.law is not None
         here = at.h.at(at.h.theta)
         here = replace(here, law=at.law.at(at.law.weights, p.h.law.scales))
@@ -205,7 +214,7 @@ def _objective(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array
     return region.likelihood.log(r, s) + Prior.of(h, options).log(h.theta) + h.law.log_prior
 
 
-def _measured(options: EvidenceOptions, at: _State) -> Asks[_State]:
+def _measure_slopes(options: EvidenceOptions, at: _State) -> Asks[_State]:
     """A state with its slopes measured there, those of weights that are not there left as they are."""
     J = yield from slopes(options, at.h, at.r)
     B = at.B.copy()
@@ -214,7 +223,7 @@ def _measured(options: EvidenceOptions, at: _State) -> Asks[_State]:
     return _State(at.h, at.r, J, B)
 
 
-def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]) -> Asks[Array]:
+def _by_weights(h: Hypothesis, r: Array, weight: float, which: Mask) -> Asks[Array]:
     """Slopes (n, M) of r by some of the law's weights, from differences of `weight` [N m]; 0 of others."""
     assert h.law is not None
     B = np.zeros((len(r), len(h.law.weights)))
@@ -235,22 +244,22 @@ def slopes_by_law(options: EvidenceOptions, f: Fitted) -> Asks[Array | None]:
 
 
 def _as_fit(region: Region, options: EvidenceOptions, at: _State) -> Fitted:
-    return judged(region, options, at.h, at.r, at.J, at.B[:, at.law.active])
+    return evaluate(region, options, at.h, at.r, at.J, at.B[:, at.law.active])
 
 
-def _predicted(region: Region, options: EvidenceOptions, at: _State) -> _Predicted:
+def _predict_groups(region: Region, options: EvidenceOptions, at: _State) -> _Predicted:
     """The most probable groups (at least one) and scales of a law together with a state's effects, by linear algebra. Groups are
     added one by one while that pays, each at its best scale given the others."""
     best, chosen = None, dict[str, float]()
     scales = [share * at.law.full_torque for share in options.law.shares]
-    while tries := [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s})
+    while tries := [(_solve(region, options, at, chosen | {g: s}), chosen | {g: s})
                     for g in at.law.groups if g not in chosen for s in scales]:
         p, with_it = max(tries, key=lambda t: t[0].log_posterior)
         if best is not None and p.log_posterior <= best.log_posterior:
             break
         best, chosen = p, with_it
         for g in [*chosen][:-1]:  # what an earlier one needs is another size now
-            again = [(_solved(region, options, at, chosen | {g: s}), chosen | {g: s}) for s in scales if s != chosen[g]]
+            again = [(_solve(region, options, at, chosen | {g: s}), chosen | {g: s}) for s in scales if s != chosen[g]]
             other, those = max(again, key=lambda t: t[0].log_posterior)
             if other.log_posterior > best.log_posterior:
                 best, chosen = other, those
@@ -258,7 +267,7 @@ def _predicted(region: Region, options: EvidenceOptions, at: _State) -> _Predict
     return best
 
 
-def _solved(region: Region, options: EvidenceOptions, at: _State, scales: Scales) -> _Predicted:
+def _solve(region: Region, options: EvidenceOptions, at: _State, scales: Scales) -> _Predicted:
     """Theta and the weights of some groups together, by reweighted least squares on a state's slopes."""
     law, likelihood = at.law.at(at.law.weights, scales), region.likelihood
     there, prior, k = law.active, Prior.of(at.h, options), len(at.h.theta)

@@ -36,7 +36,7 @@ class Drift:
     chance: float
 
     def as_unexplained(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
-        """As something that a constant number does not explain."""
+        """The drift as an unexplained residual, since a constant number does not explain it."""
         p, joint = self.effect.parameters[self.number], self.effect.joint
         e = next((e for e in evidence if joint is None or joint in e.channels), evidence[0])
         channel = joint if joint in e.channels else e.joints[0]
@@ -59,7 +59,7 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
 
 
 def drift(c: Candidate, x: Array, k: int, t: Trend) -> Drift | None:
-    """Of number k of an effect's sizes x, where a trend is a good part of it."""
+    """The drift of number k of an effect's sizes x, where a trend is a good part of it."""
     if c.read_off and c.effect.free_play:
         return None  # a loose mount rattles by chance, and nothing else is seen across an axis
     if c.shapes[k] or not abs(t.change) > FIT.drift * abs(x[k]):

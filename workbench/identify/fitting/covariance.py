@@ -16,8 +16,8 @@ from workbench.types import Array
 def covariance_of(
     evaluator: RolloutEvaluator, solved: Solved, takes: tuple[int, ...], joint: str | None = None, bent: bool = True
 ) -> Array:
-    """Of a block's numbers; joint: whose channels identify them, None for all; bent: whether contact bends what floating-base
-    takes identify. Infinite where nothing depends on a number."""
+    """Covariance of a block's numbers. joint: whose channels identify them, None for all; bent: whether contact bends what
+    floating-base takes identify. Infinite where nothing depends on a number."""
     stretches = evaluator.stretches(takes, "fit", joint)
     engines = bent * FIT.contact_error * np.abs(solved.x) * _floating_share(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)

@@ -43,7 +43,7 @@ class Fit:
     slopes: tuple[Slopes, ...] = field(default=(), repr=False)
 
     def slices(self) -> list[slice]:
-        """Of x, for each effect."""
+        """The part of x that belongs to each effect."""
         ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
@@ -53,16 +53,16 @@ class Fit:
         return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
 
     def sizes(self, x: Array | None = None) -> Sizes:
-        """Each effect with its own sizes; with those of another x."""
+        """Each effect with its sizes, from the fit's own x or from another."""
         x = self.x if x is None else x
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
     def sizes_without(self, key: Key) -> Sizes:
-        """Those of every effect but one."""
+        """The sizes of every effect except one."""
         return [s for s in self.sizes() if s[0].key != key]
 
     def sizes_with(self, key: Key, x: Array) -> Sizes:
-        """Those of every effect, with one at other sizes."""
+        """The sizes of every effect, one of them replaced."""
         return [(c, x if c.key == key else own) for c, own in self.sizes()]
 
     def sizes_by_key(self) -> dict[Key, Array]:
@@ -70,7 +70,7 @@ class Fit:
         return {c.key: x for c, x in self.sizes()}
 
     def bounds(self) -> tuple[Array, Array]:
-        """Of x."""
+        """Bounds of x."""
         ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 

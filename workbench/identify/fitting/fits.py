@@ -53,15 +53,15 @@ class Search:
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
 
     def identified_on_fixed_base(self, c: Candidate) -> bool:
-        """The same, or there are no others."""
+        """Whether all takes have a fixed base, or fixed-base takes identify this candidate."""
         return self.is_settled(c) or self.fixed_base == self.fitted
 
     def floating_base(self, takes: tuple[int, ...]) -> tuple[int, ...]:
-        """Of these takes, those whose base is not fixed."""
+        """The takes among these whose base is not fixed."""
         return tuple(i for i in takes if i not in self.fixed_base)
 
     def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
-        """Of these takes, those that identify numbers of effects: where some have a floating base these alone, unless an effect
+        """The takes among these that identify numbers of effects: where some have a floating base these alone, unless an effect
         is of the whole robot or of the cameras; what fixed-base takes show of a joint or a link has been asked before."""
         floating_base = self.floating_base(takes)
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
@@ -116,7 +116,7 @@ class Search:
 
     def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None,
                   step: float = 1.0) -> Part[Fit]:
-        """The same as a generator that runs alongside others. step: of the time step, in search steps."""
+        """`refit` as a generator that runs alongside others. step: of the time step, in search steps."""
         moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
         moving = current.numbers(moved)
         if not len(moving):
@@ -170,7 +170,7 @@ class Search:
         return {j: current.numbers(i for i in moved if current.effects[i].joint == j) for j in joints}
 
     def _with_settled_numbers(self, fit: Fit) -> Fit:
-        """With covariance and slopes of those that are settled."""
+        """The fit with covariance and slopes of those numbers that are settled."""
         if self.settled is None:
             return fit
         where = {c.key: i for i, c in enumerate(self.settled.effects)}
@@ -269,6 +269,6 @@ def _around(fit: Fit, n: int) -> list[Array]:
 
 
 def _bottom(seen: Sequence[Fit], n: int, ends: tuple[float, float]) -> float:
-    """Of number n, the bottom of the parabola through three fits, or where the best of them has it."""
+    """The value of number n at the bottom of the parabola through three fits, or where the best of them has it."""
     bottom = lowest([(f.x[[n]], f.cost["fit"]) for f in seen], *(np.array([end]) for end in ends))
     return float(min(seen, key=lambda f: f.cost["fit"]).x[n] if bottom is None else bottom[0])

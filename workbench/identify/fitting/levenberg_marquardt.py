@@ -164,7 +164,8 @@ def steps_of(x: Array, low: Array, high: Array, stride: float | Array, magnitude
 
 
 def lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:
-    """Of one number, where the parabola through the three best sizes seen is lowest; None where it is not, or not known."""
+    """The size of one number at which the parabola through the three best sizes seen is lowest; None where it is not, or not
+    known."""
     if len(low) != 1:
         return None
     best = sorted({float(at[0]): cost for at, cost in seen}.items(), key=lambda p: p[1])[:3]

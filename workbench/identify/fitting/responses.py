@@ -88,9 +88,9 @@ def _between(r0: Array, seen: Sequence[tuple[float, Array]], far: float, bounds:
 
 
 def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
-    """The same for several parameters: the responses at points (k, n) are described by a line for each parameter and, since walks
-    respond nonlinearly, by squares of those that were simulated on both sides and the product of the first two; returns the sizes
-    that minimise the sum of squares of that, or of a simulated point."""
+    """The guess for several parameters: the responses at points (k, n) are described by a line for each parameter and, since
+    walks respond nonlinearly, by squares of those that were simulated on both sides and the product of the first two; returns the
+    sizes that minimise the sum of squares of that, or of a simulated point."""
     both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
 
     def terms(x: Array) -> Array:

@@ -35,7 +35,7 @@ class Change:
     unit: str
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"before": _number(self.before), "after": _number(self.after), "unit": self.unit}
 
 
@@ -58,7 +58,7 @@ class Estimate:
                 raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"value": _numbers(self.value), "low": _numbers(self.low), "high": _numbers(self.high), "unit": self.unit}
 
 
@@ -74,7 +74,7 @@ class Alternative:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence)}
 
 
@@ -89,7 +89,7 @@ class FamilyBelief:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"name": self.name, "confidence": _number(self.confidence)}
 
 
@@ -138,7 +138,7 @@ class Finding:
         return max(self.of_tie or 0.0, self.confidence + sum(a.confidence for a in self.alternatives)) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
                 **({} if self.of_tie is None else {"of_tie": _number(self.of_tie)}),
                 **({} if self.family is None else {"family": self.family.to_json()}),
@@ -157,7 +157,7 @@ class Rejected:
     validation: Change | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.in_words()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
@@ -181,7 +181,7 @@ class GapEntry:
             raise ValueError(f"layer: expected one of {', '.join(get_args(Layer))}, got {self.layer!r}")
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"layer": self.layer, "where": list(self.where), "take": self.take,
                 "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_optional("phase", self.phase),
                 "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit}
@@ -198,7 +198,7 @@ class Unexplained:
     description: Description
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
                 "description": self.description.in_words()}
 
@@ -214,7 +214,7 @@ class NextExperiment:
     log_likelihood_ratios: tuple[float, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The content of findings.json."""
         return {"motion": self.motion, "base": self.base, "separates": [list(pair) for pair in self.separates]}
 
 

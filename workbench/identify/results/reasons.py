@@ -17,7 +17,7 @@ Signal = Literal["time", "angle", "size of the angle", "speed", "direction of mo
 
 
 def effect_at(effect: str, where: Sequence[str]) -> str:
-    """As findings.json calls it: "backlash(flm)"."""
+    """Name of an effect at its place, as in findings.json: "backlash(flm)"."""
     return f"{effect}({','.join(where)})"
 
 
@@ -30,7 +30,7 @@ class Statement(ABC):
 
     @abstractmethod
     def in_words(self, naming: Naming = effect_at) -> str:
-        """In words, without a full stop."""
+        """The reason in words, without a full stop."""
 
     def __str__(self) -> str:
         return self.in_words()

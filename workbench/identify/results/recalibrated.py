@@ -19,10 +19,10 @@ class Recalibrated:
 
     @property
     def sigmas(self) -> float:
-        """By how many standard deviations it was adjusted."""
+        """How many standard deviations it was adjusted by."""
         return (self.value - self.nominal) / self.sd
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
                 "unit": self.unit}

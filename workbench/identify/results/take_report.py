@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.take import Take
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class TakeReport:
     noise: Array
     before: Array
     after: Array
-    unseen: NDArray[np.bool_]
+    unseen: Mask
 
     def __post_init__(self) -> None:
         shape = (len(self.recorded), len(self.channels))
@@ -50,7 +49,7 @@ class TakeReport:
         return self.recorded.since_start
 
     @property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Mask:
         """Frames (N,) on which a model is evaluated: the unseen ones, or all where there are none."""
         return self.unseen if self.unseen.any() else np.ones(len(self.unseen), dtype=bool)
 

@@ -22,7 +22,7 @@ class TiedName:
     behind: float
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "behind": round(self.behind, 1),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()}, "evidence": self.sentence}
 
@@ -54,10 +54,10 @@ class GravityOverTorque:
         """The ratio in a sentence."""
         low, high = self.ratio.low, self.ratio.high
         joints, before = ", ".join(self.where), "earlier model" if self.since else "files"
-        told = f"{self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times that of the {before}"
+        ratio = f"{self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times that of the {before}"
         if low <= 1.0 <= high:  # type: ignore[operator]
-            return f"Gravity acts differently on {joints} than in the {before}, while the ratio of gravity to torque is {told}."
-        return f"The ratio of gravity to torque in {joints} is {told}."
+            return f"Gravity acts differently on {joints} than in the {before}, while the ratio of gravity to torque is {ratio}."
+        return f"The ratio of gravity to torque in {joints} is {ratio}."
 
     @property
     def may_be_torque(self) -> bool:
@@ -75,7 +75,7 @@ class GravityOverTorque:
         torque = f"all torques of the servo multiplied by {1 / float(self.ratio.value):.2f}"  # type: ignore[arg-type]
         causes = [(torque, self.torque_behind)] if self.may_be_torque else []
         causes += [(n.sentence.rstrip("."), n.behind) for n in self.competitive]
-        each = [f"{said} ({behind:.0f} nats behind)" if behind >= 1 else said for said, behind in causes]
+        each = [f"{cause} ({behind:.0f} nats behind)" if behind >= 1 else cause for cause, behind in causes]
         if len(each) == 1 and not self.may_be_several:
             return f"{self.change} The recordings leave only one possible cause: {each[0]}."
         more = "" if self.since else ", or compare with an earlier diagnosis of this servo (`--model`)"
@@ -86,7 +86,7 @@ class GravityOverTorque:
         return f"{self.change} {causes_said} To find out, hang a known weight on the link in some takes (`load:`){more}."
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
                 "confidence": float(self.confidence), "torque_behind": round(self.torque_behind, 1),
                 "names": [n.to_json() for n in self.names], "evidence": self.in_words()}

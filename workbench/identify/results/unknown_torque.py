@@ -12,8 +12,9 @@ from workbench.robot.torque_table import UNITS, TorqueTable
 
 @dataclass(frozen=True)
 class UnknownTorque:
-    """At one joint. confidence: probability (0 to 1) that such a torque is there; rms [N m]: over the recorded motion; tables:
-    the torque, as model.yaml has it; sd [N m]: standard deviations of each table's torques; fit, validation: as in `Finding`."""
+    """A torque at one joint that no effect describes. confidence: probability (0 to 1) that such a torque is there; rms [N m]:
+    over the recorded motion; tables: the torque, as model.yaml has it; sd [N m]: standard deviations of each table's torques;
+    fit, validation: as in `Finding`."""
 
     joint: str
     confidence: float
@@ -41,7 +42,7 @@ class UnknownTorque:
                "which no known effect describes."
 
     def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
+        """The entry in findings.json."""
         tables = [t.as_dict() | {"unit": UNITS[t.depends_on], "sd": list(sd)} for t, sd in zip(self.tables, self.sd)]
         return {"joint": self.joint, "confidence": float(self.confidence), "rms": float(self.rms), "unit": "N m",
                 "tables": tables, "fit": self.fit.to_json(), "validation": self.validation.to_json(), "evidence": self.evidence}

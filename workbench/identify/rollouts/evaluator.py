@@ -98,8 +98,8 @@ class RolloutEvaluator:
         return Rollout(self.evidence[take], q.model, self.job(felt, take, config, self._until(take, q)))
 
     def uncorrected(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-        """As `residuals`, whatever their step is wrong by. Servo logs are not shifted, as their start is known, and come straight
-        from the compiled station where it knows their physics."""
+        """`residuals` without the correction for the error of their step. Servo logs are not shifted, as their start is known,
+        and come straight from the compiled station where it knows their physics."""
         if self.config.engine == "drake" or not all(is_log(self.evidence[i]) for q in questions for i in q.takes):
             return self.residuals(questions, corrected=False)
         answers: dict[str, Array] = {}
@@ -138,14 +138,14 @@ class RolloutEvaluator:
                 pool.shutdown(cancel_futures=True)
 
     def _log_residual(self, i: int, angles: Array) -> Array:
-        """Of a log's angles (M, c) at its `frames`."""
+        """Residuals of a log's angles (M, c) at its `frames`."""
         e = self.evidence[i]
         simulated = np.full(e.recorded.shape, np.nan)
         simulated[frames(e)] = angles
         return np.asarray((e.recorded - simulated) / (e.sigma * e.rough))
 
     def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
-        """The same on other takes of the same robot, or on these with another observation; both share their rollouts."""
+        """The evaluator on other takes of the same robot, or on these with another observation; both share their rollouts."""
         return RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
 
     @property
@@ -164,7 +164,7 @@ class RolloutEvaluator:
         return [self.evidence[i].take.observe(r, model) for i, r in zip(everywhere, rollouts)]
 
     def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
-        """One rollout; each take's own servo changes apply."""
+        """The job of one rollout, with the take's own servo changes."""
         e = self.evidence[take]
         spec = e.take.spec
         frames = e.since
@@ -249,7 +249,7 @@ class RolloutEvaluator:
         return np.where(np.concatenate(slight) & (cost <= most), expected, most)
 
     def _length(self, take: int, until: float = np.inf) -> float:
-        """Of a rollout [s of a puppy's], a walk counting more as it takes longer, few joints less."""
+        """Cost of a rollout [s of a puppy's rollout], a walk counting more as it takes longer, few joints less."""
         e = self.evidence[take]
         share = (len(e.joints) + PROBLEM.station_joints) / (PROBLEM.puppy_joints + PROBLEM.station_joints)
         return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
@@ -269,7 +269,7 @@ class RolloutEvaluator:
         return f"{self._model_keys.of(felt)}-{self._take_keys[take]}-{q.step:g}{late}"
 
     def _windows_key(self, take: int, horizon: float) -> str:
-        """Of the windows of a log: when and in which recorded states they begin; empty where it is rolled out whole."""
+        """Key of a log's windows: when and in which recorded states they begin; empty where it is rolled out whole."""
         if np.isinf(horizon):
             return ""
         if (take, horizon) not in self._state_keys:
@@ -291,7 +291,7 @@ class RolloutEvaluator:
 
 
 def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Of `RolloutEvaluator.stretches`."""
+    """Take of each entry of `RolloutEvaluator.stretches`."""
     return stretches // PROBLEM.most_stretches
 
 

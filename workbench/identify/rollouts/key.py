@@ -30,7 +30,7 @@ _FILES = ("compare/channels.py", "compare/comparison.py", "compare/session_takes
 
 @cache
 def rollout_code() -> str:
-    """Of everything between a model and the channels of its rollout: versions, and the content of the packages it goes
+    """Digest of everything between a model and the channels of its rollout: versions, and the content of the packages it goes
     through."""
     root = Path(__file__).parents[2]
     digest = hashlib.sha256(" ".join(version(name) for name in ("drake", "numba", "numpy", "scipy")).encode())
@@ -62,14 +62,14 @@ class ModelKeys:
         self._last: tuple[RobotModel, str] | None = None
 
     def of(self, model: RobotModel) -> str:
-        """Of the description's content and of everything said about it."""
+        """Digest of the description's content and of everything stated about it."""
         if self._last is not None and self._last[0] is model:  # on another take
             return self._last[1]
-        told = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
-        source = f"{model.description} {told}"
+        settings = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
+        source = f"{model.description} {settings}"
         if source not in self._files:
             content = model.source.source.read_bytes()
-            self._files[source] = hashlib.sha256(content + b" " + told.encode()).hexdigest()
+            self._files[source] = hashlib.sha256(content + b" " + settings.encode()).hexdigest()
         physics = repr((sorted(model.servos.items()), model.effects))
         key = hashlib.sha256(f"{self._files[source]} {physics}".encode()).hexdigest()
         self._last = (model, key)
@@ -77,7 +77,7 @@ class ModelKeys:
 
 
 def take_key(e: TakeEvidence, config: SimulationConfig) -> str:
-    """Of a take as it is simulated and looked at, whatever the model."""
+    """Digest of a take as it is simulated and observed, whatever the model."""
     played, spec = e.take.commands, e.take.spec
     sent = None if played is None else (played.joints, played.times, played.goals, played.speeds, played.enabled, played.end)
     windows = None if e.steadied is None else tuple(np.asarray(x) for x in vars(e.steadied).values())

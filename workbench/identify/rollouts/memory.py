@@ -111,7 +111,7 @@ class RolloutMemory:
             self._bytes -= self._held.popitem(last=False)[1].nbytes
 
     def _read(self, path: Path) -> None:
-        """Where the records of a file are."""
+        """Places of the records of a file."""
         file = self._open(path, os.O_RDONLY)
         at, end = 0, os.fstat(file).st_size
         while len(header := os.pread(file, _HEADER.size, at)) == _HEADER.size:

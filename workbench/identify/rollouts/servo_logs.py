@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.robot import RobotModel
@@ -17,7 +16,7 @@ from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
@@ -34,7 +33,7 @@ def is_log(e: TakeEvidence) -> bool:
     return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints
 
 
-def frames(e: TakeEvidence) -> NDArray[np.bool_]:
+def frames(e: TakeEvidence) -> Mask:
     """Frames of a log that are looked at."""
     return np.asarray((e.since >= 0) & (e.since <= e.until))
 
@@ -47,9 +46,9 @@ def _log_config(config: SimulationConfig) -> SimulationConfig:
 
 def log_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
                questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
-    """Of each request on some takes the angles (M, c) [rad] at each log's `frames`; None where the compiled station does not know
-    the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one structure
-    play a log together."""
+    """The angles (M, c) [rad] of each request at each log's `frames`, on some takes; None where the compiled station does not
+    know the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one
+    structure play a log together."""
     held = {q.step: _log_config(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
     played = servo_angles([_jobs([evidence[i] for i in takes], q.model, held[q.step], q.horizon) for q, takes in questions])
     return [None if isinstance(angles, NotCoveredError) else

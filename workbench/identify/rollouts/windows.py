@@ -22,7 +22,7 @@ _known: Cache[JointStates] = Cache(PROBLEM.states_kept)
 
 
 def recorded_states(take: RegisteredTake, horizon: float) -> JointStates:
-    """Of a servo log's joints, every `horizon` [s] after its first command; the same object for the same take."""
+    """States of a servo log's joints every `horizon` [s] after its first command; the same object for the same take."""
     return _known.get((id(take), horizon), lambda: _read(take, horizon), held=take)
 
 
@@ -39,8 +39,8 @@ def _read(take: RegisteredTake, horizon: float) -> JointStates:
 
 @dataclass(frozen=True)
 class _Polynomial:
-    """Through the positions around one time: position [rad], speed [rad/s], its standard error for noise of 1 rad; squares: sum
-    of squared residuals [rad^2]; freedom: their number less that of the coefficients."""
+    """A polynomial through the positions around one time: position [rad], speed [rad/s], its standard error for noise of 1 rad;
+    squares: sum of squared residuals [rad^2]; freedom: their number less that of the coefficients."""
 
     position: float
     speed: float
@@ -76,7 +76,8 @@ def _polynomial(time: Array, position: Array, at: float, span: float) -> _Polyno
 
 
 def _widest(fits: Sequence[_Polynomial | None], usual: float) -> _Polynomial | None:
-    """Of fits over growing spans; usual [rad^2]: variance of the noise in all windows together, which is least believed here."""
+    """The best of fits over growing spans. usual [rad^2]: variance of the noise in all windows together, which is least believed
+    here."""
     chosen = fits[0]
     if chosen is None:
         return None

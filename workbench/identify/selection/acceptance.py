@@ -33,7 +33,8 @@ def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...],
 
 
 def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> Array:
-    """By channel of a take, the allowance for errors of the accepted effects: a share of their gain from `before` to `now`."""
+    """The allowance of each channel of a take for errors of the accepted effects: a share of their gain from `before` to
+    `now`."""
     e = search.evaluator.evidence[take]
     shares = np.full(len(e.channels), share)
     if not search.evaluator.any_floating((take,)):
@@ -83,7 +84,7 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
 
 
 def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
-    """Those in which something was taken that fixed-base takes identified."""
+    """The rounds that accepted an effect identified by fixed-base takes."""
     return [r for r in rounds if any(search.is_settled(t.candidate) for t in accepted_effects([r]))]
 
 

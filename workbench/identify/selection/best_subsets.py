@@ -13,7 +13,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit, Sizes
@@ -23,7 +22,7 @@ from workbench.identify.options import FIT
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS
 from workbench.identify.selection.record import SelectionStep
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Response:
     points: Array
 
     def sizes(self, share: Array) -> Array:
-        """With these shares (k,) of the points, as far as they may go."""
+        """Sizes at these shares (k,) of the points, as far as bounds allow."""
         low, high = self._bounds
         return np.minimum(np.maximum(np.where(self.shapes, self.points[0], share @ self.points), low), high)
 
@@ -44,8 +43,8 @@ class Response:
         return self._inverse @ x[~self.shapes]
 
     @cached_property
-    def shapes(self) -> NDArray[np.bool_]:
-        """Of the sizes, those that only shape the effect; asked for in every set, as are its bounds."""
+    def shapes(self) -> Mask:
+        """Which sizes only shape the effect. Kept, as every set asks for it and for the bounds."""
         return self.trial.candidate.shapes
 
     @cached_property
@@ -81,7 +80,7 @@ def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tupl
     return None
 
 
-def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> NDArray[np.bool_]:
+def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> Mask:
     """The entries of the vector of the channels of `judged` (None: of every channel) that belong to a joint."""
     inside = {}
     for i in takes:
@@ -170,7 +169,7 @@ def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes:
 
 
 def fitted_beside(search: Search, current: Fit, added: Sequence[CandidateFit], takes: tuple[int, ...], steps: int) -> Part[Fit]:
-    """All effects fitted together, when some were added."""
+    """Fits all effects together, after some were added."""
     return (yield from _fitted_from(search, [*current.sizes(), *((t.candidate, t.x) for t in added)], takes, steps))
 
 
@@ -179,7 +178,7 @@ def _fitted_from(search: Search, sizes: Sizes, takes: tuple[int, ...], steps: in
     return (yield from search.refitting(start, takes, steps))
 
 
-def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
+def restart_fit(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
     """A fit, or a far better one from another starting point: parameters that shape an effect make its response nonlinear, and a
     fit may end in a local minimum. steps: of the last fit."""
     starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))

@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.downward_force import pulls_down
@@ -16,7 +15,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
 from workbench.identify.selection.model_comparison import NamePosterior
 from workbench.identify.selection.options import CALIBRATION, COMPARISON, SCHEDULING
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def calibrate(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
@@ -61,7 +60,7 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
     return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < CALIBRATION.alike_floor)
 
 
-def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np.bool_]) -> bool:
+def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: Mask) -> bool:
     """Whether all parameters that scale an effect are within CALIBRATION.nothing of the values at which it vanishes."""
     half = CALIBRATION.nothing * np.sqrt(np.diag(covariance))
     makes = makes & np.isfinite(half)

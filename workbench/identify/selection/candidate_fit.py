@@ -51,5 +51,5 @@ def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains
 
 
 def best_at(best: dict[str | None, float], joint: str | None) -> float:
-    """At a joint; over all joints, for effects of the whole robot."""
+    """The best at a joint; over all joints for effects of the whole robot (None)."""
     return max(best.values()) if joint is None else best[joint]

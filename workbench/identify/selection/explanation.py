@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.conclusions import ReadOff, Residuals, finding, list_rejected, list_unexplained, posterior, ties
-from workbench.identify.estimators.dropped_again import with_commands_of
+from workbench.identify.estimators.dropped_again import TakesAsPlayed, with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
@@ -35,10 +35,12 @@ from workbench.types import Progress
 
 @dataclass(frozen=True)
 class Selected:
-    """The final fit (a `workbench.identify.search_result.SearchResult`). nominal: the robot without its effects; posteriors:
-    probability of each effect; floors: numerical error by take, over sigma; drifts: parameters that drift within a take."""
+    """The final fit (a `workbench.identify.search_result.SearchResult`). nominal: the robot without its effects; played: takes
+    as they were sent; posteriors: probability of each effect; floors: numerical error by take, over sigma; drifts: parameters
+    that drift within a take."""
 
     nominal: RobotModel
+    played: TakesAsPlayed
     looked_at: tuple[TakeEvidence, ...]
     chosen: SelectionResult
     search: Search
@@ -79,7 +81,8 @@ class Selected:
 
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
-        return evaluator.on(with_commands_of(evaluator.evidence, self.search.evaluator.evidence))
+        found = replace(self.played, missed=self.chosen.missed)
+        return evaluator.on(with_commands_of(evaluator.evidence, found.as_found().evidence))
 
     def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
         """Residuals and numerical floors on whole takes, those too that the search did not look at."""
@@ -136,4 +139,4 @@ def explained_by_selection(problem: Problem) -> Selected:
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
-    return Selected(problem.nominal, looked_at, chosen, search, fit, sure, floors, changing)
+    return Selected(problem.nominal, problem.played, looked_at, chosen, search, fit, sure, floors, changing)

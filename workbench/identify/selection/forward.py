@@ -100,9 +100,9 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             trials += fit_groups(search, current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
-            said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
-                                     or _is_of_all(search, current, trials[0], takes, beyond))
-            if said and (tier + 1 >= SCHEDULING.tiers_of_all or is_acceptable(search, trials[0], takes, rounds, current)):
+            improves = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
+                                         or _is_of_all(search, current, trials[0], takes, beyond))
+            if improves and (tier + 1 >= SCHEDULING.tiers_of_all or is_acceptable(search, trials[0], takes, rounds, current)):
                 if not _tips(search, trials[0], takes, tier):
                     break
                 likely = [c for c in pool if c.effect.moves_center]

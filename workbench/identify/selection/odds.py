@@ -53,7 +53,7 @@ def chi_squared_lead(search: Search, fit: Fit, rival: Fit, taken: CandidateFit) 
 
 
 def _ahead(search: Search, fit: Fit, rival: Fit, replaced: int) -> float:
-    """The same, whatever numbers cost."""
+    """How far the finding is ahead, whatever numbers cost."""
     return better_on_fixed_base(search, fit, rival) if search.is_settled(fit.effects[replaced]) else better_by_both(fit, rival)
 
 

@@ -21,48 +21,38 @@ Asking = Part[list[CandidateFit]]
 
 
 def fit_groups(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-          report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
-    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is fixed, one effect
-    at several joints, each judged by its own joint's channels. takes: on which, by group.
-    ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
-    responses must predict of one that is fitted."""
+               report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
+    """Every group fitted in addition to `current`, all in lockstep. A group is one candidate, or, while the base is fixed, one
+    effect at several joints, each judged by its own joint's channels.
+
+    takes: indices of the takes on which each group is fitted. ahead: largest gain on fitted stretches of rivals tried before, for
+    candidates judged by all channels. least: gain that responses must predict of a candidate that is fitted.
+    """
     race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, no_fixed_base=not search.fixed_base), []
     for n, group in enumerate(groups):
         base = {i: current.residuals[i] for i in takes[n]}
-        asking.append(
-            CandidateEvaluation(
-                search.evaluator,
-                search.nominal,
-                current.sizes(),
-                base,
-                group,
-                race,
-                search.apart(group[0], takes[n]),
-                search.responses,
-            ).run()
-        )
+        apart = search.apart(group[0], takes[n])
+        asking.append(CandidateEvaluation(
+            search.evaluator, search.nominal, current.sizes(), base, group, race, apart, search.responses).run())
     return [trial for trials in search.side_by_side(asking, report) for trial in trials]
+
+
+def _barrier() -> Part[None]:
+    """Requests nothing, and continues when every group that runs in lockstep has come this far."""
+    yield []
 
 
 class CandidateEvaluation:
     """The course of one group through the screening: simulated, extrapolated, first step, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
-    beside, base: accepted effects with their sizes, and their residuals on `takes`, by take. responses: of earlier screenings, to
-    which this one's are added.
+    beside, base: accepted effects with their sizes, and their residuals by take. race: gains of all groups, to which this one's
+    are added. apart: whether each candidate is judged by its own joint's channels. responses: of earlier screenings, to which
+    this one's are added.
     """
 
-    def __init__(
-        self,
-        evaluator: RolloutEvaluator,
-        nominal: RobotModel,
-        beside: Sequence[tuple[Candidate, Array]],
-        base: dict[int, Array],
-        group: Sequence[Candidate],
-        race: Race,
-        apart: bool,
-        responses: ResponseBank,
-    ) -> None:
+    def __init__(self, evaluator: RolloutEvaluator, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]],
+                 base: dict[int, Array], group: Sequence[Candidate], race: Race, apart: bool, responses: ResponseBank) -> None:
         self.evaluator, self.group, self.race, self.responses = evaluator, group, race, responses
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
@@ -78,8 +68,8 @@ class CandidateEvaluation:
 
     def run(self) -> Asking:
         """Trials of every candidate in the group."""
-        past = yield from self._past()
-        starts, gains = past or (yield from self._looked_at())
+        past = yield from self._recall()
+        starts, gains = past or (yield from self._probe())
         alive = [] if past else (yield from self._worth_fitting(gains))
         out = [CandidateFit(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, True, (g, self._best(j)))
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
@@ -93,17 +83,17 @@ class CandidateEvaluation:
         final = final if finely else self._fine_residuals(final)
         return out + [self._judge(b, x, final) for b, x in zip(alive, sizes)]
 
-    def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
-        """Sizes and gains as responses of an earlier screening predict them, where that is hopeless; None: to be looked at."""
+    def _recall(self) -> Part[tuple[list[Array], list[float]] | None]:
+        """Sizes and gains predicted by responses of an earlier screening, where these leave no hope; None: to be simulated."""
         known = self.responses.get(self._name) if self.walking else None
         guesses = None if known is None else self._initial_sizes(*known)
         if guesses is not None:
             note_best(self.race.remembered, self.joints, guesses[1])
-        yield []  # until all have said what they remember
+        yield from _barrier()  # every group has noted what it remembers
         enough = max(SCREENING.remembered_least * self.race.least, SCREENING.remembered * best_at(self.race.remembered, None))
         return None if guesses is None or guesses[1][0] >= enough else guesses
 
-    def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
+    def _probe(self) -> Part[tuple[list[Array], list[float]]]:
         """Sizes to start from and what responses say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
@@ -117,12 +107,12 @@ class CandidateEvaluation:
         calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
         if calm is None:
             return guess
-        x = yield from self._fitted_on(*calm)
+        x = yield from self._fit_on(*calm)
         (answer,) = yield [self._question([0], [x])]
         return max(guess, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
 
-    def _fitted_on(self, take: int, x: Array) -> Part[Array]:
-        """Sizes as one take alone wants them."""
+    def _fit_on(self, take: int, x: Array) -> Part[Array]:
+        """Sizes fitted to one take alone, from initial sizes x."""
         def ask(point: Sequence[Array]) -> RolloutRequest:
             return replace(self._question([0], point), takes=(take,))
 
@@ -134,7 +124,8 @@ class CandidateEvaluation:
         return solved.x
 
     def _calmest(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
-        """The take of which responses explain most, and sizes as it wants them; None where none is, or all are (gain)."""
+        """The take of which responses explain most, and sizes fitted to it; None where no take, or all takes together (`gain`),
+        are explained well enough."""
         beyond = {i: self.power[i] - self.evaluator.expected_cost((i,), "fit") for i in self.takes}
         if gain > SCREENING.calm * sum(beyond.values()):
             return None
@@ -162,16 +153,17 @@ class CandidateEvaluation:
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _best(self, joint: str | None) -> float:
+        """The largest gain that responses predict at a joint, or anywhere (None)."""
         seen = (self.race.predicted, self.race.remembered)
         return max(max(of.values(), default=0.0) if joint is None else of.get(joint, 0.0) for of in seen)
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
-        """Of the group, those that are not predicted to be far behind a rival."""
+        """Indices of the candidates of the group that are not predicted to be far behind a rival."""
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
         note_best(race.predicted, self.joints, gains)
-        yield []  # until all have said what they predict
+        yield from _barrier()  # every group has noted what it predicts
         last = sorted(alike, reverse=True)[:SCREENING.most_fitted][-1] if alike else 0.0
         worth = SCREENING.worth_walking if self.walking else SCREENING.worth
         least = race.least * (1.0 if best_at(race.predicted, None) > race.least else SCREENING.doubted)
@@ -190,7 +182,7 @@ class CandidateEvaluation:
         solved = yield from improve(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
         note_best(self.race.reached, [self.joints[b] for b in alive], gains)
-        yield []  # until all have come as far
+        yield from _barrier()  # every group has noted what it reached
         ahead = [g > SCREENING.behind * best_at(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)]
         if iterations > 1 and any(ahead):
             solved = yield from improve([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
@@ -214,7 +206,7 @@ class CandidateEvaluation:
                      by_channel=before - after)
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> RolloutRequest:
-        """The robot with those of the group at these sizes, beside what there is already."""
+        """The request of the robot with the accepted effects, and those of the group at these sizes."""
         model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
         return RolloutRequest(model, self.takes, PROBLEM.coarse if self.coarse else 1.0)
 

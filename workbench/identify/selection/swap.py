@@ -22,10 +22,10 @@ from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.identify.selection.best_subsets import (
     Response,
-    begun_again,
     fitted_beside,
     penalised_cost,
     possible,
+    restart_fit,
     several,
     variants,
     worst_joint,
@@ -50,7 +50,7 @@ def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], take
         fit, chosen = sets[0]
         if _is_right(search, fit, takes, joint):
             break
-        if (again := begun_again(search, fit, takes, SUBSETS.together_steps)) is not fit:
+        if (again := restart_fit(search, fit, takes, SUBSETS.together_steps)) is not fit:
             sets[0] = again, chosen
             continue
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
@@ -138,7 +138,7 @@ def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], res
 
 
 def _bounds(seen: Response, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
-    """Of moves of those that stay, and of shares of the points at which the other was seen."""
+    """Bounds on moves of the effects that stay, and on shares of the points at which the other was seen."""
     low = [e.bounds()[0] - size for e, size in zip(staying, x)]
     high = [e.bounds()[1] - size for e, size in zip(staying, x)]
     if len(seen.points) == 1:

@@ -86,15 +86,15 @@ def read_bam_log(path: str | Path) -> Recording:
                      commands=commands_of_rows(time, (joint,), goals[:, None], enabled[:, None] != 0))
 
 
-def _supply_problems(said: Any, measured: Array) -> list[str]:
+def _supply_problems(stated: Any, measured: Array) -> list[str]:
     """A line if the supply stated in the header differs from the one that the servo measured (N,) [V]."""
     seen = measured[np.isfinite(measured) & (measured > 0)]
-    if isinstance(said, bool) or not isinstance(said, (int, float)) or not len(seen):
+    if isinstance(stated, bool) or not isinstance(stated, (int, float)) or not len(seen):
         return []
     volts = float(np.median(seen))
-    if abs(said - volts) <= max(_SUPPLY * volts, _LEAST_VOLTS):
+    if abs(stated - volts) <= max(_SUPPLY * volts, _LEAST_VOLTS):
         return []
-    return [f"vin says {said:g} V, but the servo measured {volts:.4g} V (input_volts, {seen.min():.4g} to {seen.max():.4g}): "
+    return [f"vin says {stated:g} V, but the servo measured {volts:.4g} V (input_volts, {seen.min():.4g} to {seen.max():.4g}): "
             f"give the "
             "supply that was there as the servo's supply_voltage"]
 

@@ -54,8 +54,7 @@ def read_body_poses(path: Path) -> Recording:
     unknown = [n for i, n in enumerate(header.names) if i not in known and not (i == 0 and header.index)]
     if unknown:
         raise InputError(source, f"line {header.lines}: unknown column '{unknown[0][:40]}'; expected time and BODY.x, y, z, "
-                                 f"qw, qx, "
-                                 "qy, qz of each body")
+                                 "qw, qx, qy, qz of each body")
     table = read_columns(source, content, header.end, header.lines, len(header.names), wanted=known)
 
     def stack(of: dict[str, int], what: tuple[str, ...]) -> np.ndarray:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording import quaternions as quat
@@ -15,7 +14,7 @@ from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.log_commands import order_problem
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.recording import Recording
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 1e-3, "millimeters": 1e-3, "millimetres": 1e-3}
 _FEWEST = 3
@@ -139,7 +138,7 @@ def _fit_body(at: Array, shape: Array) -> BodyTrack:
     """The path of a body whose markers (M, 3) [m] about their middle are seen at (N, M, 3): least squares, in frames that show
     three of them at least."""
     p, q = np.full((len(at), 3), np.nan), np.full((len(at), 4), np.nan)
-    seen: NDArray[np.bool_] = np.asarray(np.isfinite(at).all(axis=2))
+    seen: Mask = np.asarray(np.isfinite(at).all(axis=2))
     for k in np.flatnonzero(seen.sum(axis=1) >= _FEWEST):
         a, b = shape[seen[k]], at[k][seen[k]]
         u, _, vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))

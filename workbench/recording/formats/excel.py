@@ -13,8 +13,8 @@ from workbench.files.tables import plain_head
 from workbench.recording.formats.registry import RecordingFormat, format_of
 from workbench.recording.recording import Recording
 
-_MOST = 64 << 20
-"""Largest size of the file, and of its unpacked content [bytes]."""
+_MOST, _MOST_UNPACKED = 64 << 20, 512 << 20
+"""Largest size of the file, and of its unpacked content [bytes], whose sheets are all read into memory at once."""
 _DAMAGED = (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, IndexError, TypeError, AttributeError)
 
 
@@ -31,7 +31,7 @@ def read_excel(path: Path) -> Recording:
     source = str(path)
     try:
         with zipfile.ZipFile(regular_file(path, _MOST)) as packed:
-            if sum(entry.file_size for entry in packed.infolist()) > 8 * _MOST:
+            if sum(entry.file_size for entry in packed.infolist()) > _MOST_UNPACKED:
                 raise InputError(source, "an Excel workbook that is too large when unpacked; save the sheet as CSV")
         sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
     except InputError:

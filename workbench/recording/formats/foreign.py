@@ -9,6 +9,7 @@ from pathlib import Path
 
 from workbench.files import InputError
 from workbench.files.kinds import kind_of_file, lfs_pointer
+from workbench.files.listing import list_names
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary
 from workbench.recording.formats.odd_tables import long_table, odd_table
@@ -69,8 +70,8 @@ def refusal(path: Path, head: bytes) -> InputError:
     if all(number_of(c) is not None for c in cells if c):
         return InputError(path, f"line 1: {len(cells)} columns of numbers without names; expected a header (of a joint log: "
                                 "time, goal.J and position.J of each joint J in degrees; of a Motive export: its own)")
-    more = f" and {len(cells) - _SHOWN} more" if len(cells) > _SHOWN else ""
-    text = f"line {header.lines}: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected " \
+    columns = list_names([c[:40] for c in cells], _SHOWN)
+    text = f"line {header.lines}: not a recording; columns {columns}; expected " \
            f"time [s], goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
     return InputError(path, text + _hint([_column(c) for c in cells]))
 

@@ -171,8 +171,8 @@ def _scales(joints: tuple[str, ...], positions: Array) -> tuple[Array, list[str]
     if np.all(np.abs(counts[known] - COUNT) < _CLEAN * COUNT):
         return np.ones(len(joints)), []
     if np.all(np.abs(np.rad2deg(counts[known]) - COUNT) < _CLEAN * COUNT):
-        said = "angles are in radians, as their steps show (one count of 4096 a turn); converted"
-        return np.full(len(joints), 180 / np.pi), [said]
+        note = "angles are in radians, as their steps show (one count of 4096 a turn); converted"
+        return np.full(len(joints), 180 / np.pi), [note]
     shown = ", ".join(f"{j} {c:.4g}" for j, c in zip(joints, counts) if np.isfinite(c))
     out = [f"angles are of each joint's range, not degrees: their steps ({shown}) differ; scaled so that a step is one count of "
            "4096 a turn, zero at the middle of the range"]

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
-def out_of_order(time: Array) -> NDArray[np.bool_]:
+def out_of_order(time: Array) -> Mask:
     """Which of times (N,) [any unit] are not finite, or not later than the one before. Times are compared after the first is
     subtracted, as readers do that: a first time of -1e308 makes all the others equal."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -75,7 +74,7 @@ def _why_out_of_order(time: Array) -> str:
     return "expected increasing times"
 
 
-def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_] | None = None,
+def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: Mask | None = None,
                      initial: Array | None = None, speeds: Array | None = None) -> Commands:
     """Rows of goals (N, n) [rad] at times (N,) [s] as commands, zero at the first row, only where something changes.
 

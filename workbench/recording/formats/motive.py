@@ -150,9 +150,9 @@ def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], 
         problems.append(f"frame numbers count every {step} although {rate:g} frames a second are exported; taken as one each, as "
                         "the Time column has it")
         return frames[0] + (frames - frames[0]) // step, rate
-    told = float(ticks / span)
-    problems.append(f"the header says {rate:g} frames a second, the Time column {told:.4g}; the Time column is used")
-    return frames, told
+    measured = float(ticks / span)
+    problems.append(f"the header says {rate:g} frames a second, the Time column {measured:.4g}; the Time column is used")
+    return frames, measured
 
 
 def _rate(source: str, header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], problems: list[str]) -> float:

@@ -100,8 +100,8 @@ def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: i
             return InputError(source, f"line {n}: {len(row)} of {width} columns{_why_width(row, width, last)}")
         for i, cell in enumerate(row):
             if i not in text and cell not in _BLANK and number_of(cell) is None:
-                told = MistypedError if cell.strip().isalpha() else InputError
-                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'{_why_word(row, cell)}")
+                error = MistypedError if cell.strip().isalpha() else InputError
+                return error(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'{_why_word(row, cell)}")
     return None
 
 

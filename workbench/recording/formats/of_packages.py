@@ -34,8 +34,8 @@ def _read(read: Callable[..., Any], at: str, path: Path, *part: str) -> Recordin
         raise InputError(path, f"{at}: {wrong}")
     unknown = [c for c in recording.channels if not _is_known(c)]
     expected = f"expected voltage, or {', '.join(OF_JOINTS)}, a point and the joint"
-    said = tuple(f"channel '{c}' is unknown; {expected}" for c in unknown)
-    return replace(recording, problems=(*recording.problems, *said)) if said else recording
+    problems = tuple(f"channel '{c}' is unknown; {expected}" for c in unknown)
+    return replace(recording, problems=(*recording.problems, *problems)) if problems else recording
 
 
 def _call(function: Callable[..., Any], at: str, *args: Any) -> Any:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from workbench.files import InputError
 from workbench.files.errors import UnknownFolderError
+from workbench.files.listing import list_names
 from workbench.files.tables import plain_head
 from workbench.recording.formats.foreign import refusal
 from workbench.recording.formats.registry import RecordingFormat, format_of, format_of_folder, known_formats
@@ -111,4 +112,4 @@ def _format(path: Path) -> RecordingFormat:
 
 
 def _list(names: tuple[str, ...]) -> str:
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+    return list_names(names, 12)

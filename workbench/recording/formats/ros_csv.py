@@ -127,9 +127,9 @@ def _name(table: pa.Table, names: dict[str, int], key: str) -> str:
     if not key.isdecimal():
         return key
     if key in names:
-        told = next((s for s in strings(table, names[key]) if s), "")
-        if told:
-            return told.strip()
+        name = next((s for s in strings(table, names[key]) if s), "")
+        if name:
+            return name.strip()
     return f"joint_{int(key) + 1}"
 
 

@@ -140,7 +140,7 @@ def _transforms(recording: Recording, types: Any, began: float) -> Messages:
 
 
 def _transform(types: Any, at: int, body: str, p: Array, quat: Array) -> Any:
-    """From the axes of recordings (y up) to ROS's (z up)."""
+    """Rotates from the axes of recordings (y up) to ROS's (z up)."""
     vector, turn = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
     w, x, y, z = map(float, quat)
     return types["geometry_msgs/msg/TransformStamped"](

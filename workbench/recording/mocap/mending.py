@@ -16,7 +16,7 @@ from workbench.recording.mocap.tracks import Tracks, tracks_of
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 LONGEST_MENDED = 0.05
 """Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop, so they stay open."""
@@ -83,7 +83,7 @@ def _without_spikes(tracks: Tracks) -> Tracks:
     return replace(tracks, p=p, q=q, problems=tuple(problems))
 
 
-def gaps_of(seen: NDArray[np.bool_]) -> NDArray[np.int_]:
+def gaps_of(seen: Mask) -> NDArray[np.int_]:
     """Runs of False in a mask (N,): (G, 2), first frame and one past the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(np.int8)))
     return edges.reshape(-1, 2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
@@ -14,7 +13,7 @@ from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, t
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array) -> tuple[Take, dict[str, BodyTrack]]:
@@ -53,7 +52,7 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
                     for a, b in bodies.items()}
 
 
-def _resting(take: Take) -> NDArray[np.bool_]:
+def _resting(take: Take) -> Mask:
     """Frames before the first command, or the first instant."""
     return take.resting if take.resting.any() else np.arange(len(take)) == 0
 
@@ -85,7 +84,7 @@ def _model_poses(q: Array, p_WB: Array, quat_WB: Array, joints: tuple[str, ...],
 
 
 def _given_poses(seen: Take, take: Take, m: Measurement, model: RobotModel) -> dict[str, tuple[Array, Array]]:
-    """As `_model_poses`, from the take's links."""
+    """The same as `_model_poses`, from the poses of the take's links."""
     rest = _resting(take)
     out = {}
     for asset in m.pivots:

@@ -12,7 +12,7 @@ from workbench.recording import quaternions as quat
 from workbench.recording.mocap.angles import Angles, base_row
 from workbench.recording.mocap.tracks import Tracks, turn_quaternion, turn_vectors
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 _PRIOR = 0.03  # [m] prior standard deviation of a pivot from its link's centre of mass
 _FRAMES = 400
@@ -90,7 +90,7 @@ def _frames(tracks: Tracks, root: int) -> NDArray[np.int64]:
     return use[np.linspace(0, len(use) - 1, min(len(use), _FRAMES)).astype(int)] if len(use) else use
 
 
-def base_origin(tracks: Tracks, model: RobotModel, yaw: float, pivots: Mapping[str, Array], resting: NDArray[np.bool_],
+def base_origin(tracks: Tracks, model: RobotModel, yaw: float, pivots: Mapping[str, Array], resting: Mask,
                 rest_rotation: Array) -> Array:
     """The base's origin at rest (3,) [m] in the capture's axes turned into the model's: the base body's mean position less
     its pivot. Zero where the base was not tracked."""

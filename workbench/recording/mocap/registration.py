@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -23,7 +22,7 @@ from workbench.recording.servo_log.state import count_of, count_that_stays, firs
 from workbench.recording.take import Take
 from workbench.recording.white_noise import white_noise
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 _SETTLED = 0.02  # [s] before the start that do not count as rest
 _FEW = 5  # with fewer frames of rest the noise is not taken from them
@@ -98,7 +97,7 @@ def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Comma
     return find_start(tracks.time, angles.joints, angles.q, noise, predicted.zeroed_at_rest())
 
 
-def noise_at_rest(q: Array, resting: NDArray[np.bool_]) -> Array:
+def noise_at_rest(q: Array, resting: Mask) -> Array:
     """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; if there is too little rest, their white noise
     over the whole recording."""
     out = np.full(q.shape[1], np.nan)
@@ -108,7 +107,7 @@ def noise_at_rest(q: Array, resting: NDArray[np.bool_]) -> Array:
     return out
 
 
-def _position_noise(tracks: Tracks, resting: NDArray[np.bool_]) -> float:
+def _position_noise(tracks: Tracks, resting: Mask) -> float:
     if resting.sum() < _FEW:
         return float("nan")
     p = tracks.p[:, resting & ~tracks.mended]
@@ -116,7 +115,7 @@ def _position_noise(tracks: Tracks, resting: NDArray[np.bool_]) -> float:
     return float(np.sqrt(np.mean(np.nanvar(p[seen], axis=1, ddof=1)))) if seen.any() else float("nan")
 
 
-def _rest_poses(tracks: Tracks, resting: NDArray[np.bool_]) -> dict[str, tuple[Array, Array]]:
+def _rest_poses(tracks: Tracks, resting: Mask) -> dict[str, tuple[Array, Array]]:
     out = {}
     for i, asset in enumerate(tracks.assets):
         at = tracks.seen[i] & resting

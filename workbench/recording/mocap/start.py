@@ -135,8 +135,8 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
 def _setting_out(time: Array, q: Array, tp: Array, qp: Array, pairs: list[tuple[int, int]]) -> tuple[float, float] | None:
     """Start [s] and its uncertainty [s] from the times at which joints leave rest, recorded (columns q) against predicted (qp),
     regardless of their speeds: the median over joints; None if fewer than two (or one, of few) are seen to leave rest."""
-    told = [(_leaves_rest(time, q[:, i]), _leaves_rest(tp, qp[:, c])) for i, c in pairs]
-    late = np.array([seen - said for seen, said in told if seen is not None and said is not None])
+    departures = [(_leaves_rest(time, q[:, i]), _leaves_rest(tp, qp[:, c])) for i, c in pairs]
+    late = np.array([seen - commanded for seen, commanded in departures if seen is not None and commanded is not None])
     if len(late) < min(2, len(pairs)):
         return None
     middle = float(np.median(late))

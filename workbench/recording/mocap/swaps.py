@@ -37,8 +37,8 @@ def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
         starts, right, reverse = _histories(tracks, sorted(events))
         holds = right
         if model is not None and right[-1] != right[0]:
-            holds = min((right, reverse), key=lambda h: _total_misfit(_put_back(tracks, starts, h), model))
-        tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_describe(tracks, starts, holds)))
+            holds = min((right, reverse), key=lambda h: _total_misfit(_restore(tracks, starts, h), model))
+        tracks = replace(_restore(tracks, starts, holds), problems=(*tracks.problems, *_describe(tracks, starts, holds)))
     return tracks if model is None else _throughout(tracks, model)
 
 
@@ -89,7 +89,7 @@ def _histories(tracks: Tracks, events: list[tuple[int, int, int]]) -> tuple[list
     return starts, holds, [[int(called[body]) for body in now] for now in holds]
 
 
-def _put_back(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Tracks:
+def _restore(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Tracks:
     """Tracks in which each body has the samples recorded for it under any label."""
     p, q, mended = tracks.p.copy(), tracks.q.copy(), tracks.mended.copy()
     for first, end, now in zip(starts, [*starts[1:], len(tracks.time)], holds):
@@ -142,7 +142,7 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
     for a, b in combinations(range(n), 2):
         holds = list(range(n))
         holds[a], holds[b] = b, a
-        trials.append((_total_misfit(_put_back(tracks, [0], [holds]), model), holds))
+        trials.append((_total_misfit(_restore(tracks, [0], [holds]), model), holds))
     best = min(misfit for misfit, _ in trials)
     if best > _WHOLE * now:
         if joint_misfit(tracks, *worst) < _TORN:
@@ -150,8 +150,8 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
         names = " and ".join(tracks.assets[i] for i in worst)
         return replace(tracks, problems=(*tracks.problems, f"{names}: their motion does not fit any joint of the model"))
     even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # with two equal legs, the exchange may be at either joint
-    holds = min(even, key=lambda h: _out_of_place(_put_back(tracks, [0], [h]), model))
-    fixed = _put_back(tracks, [0], [holds])
+    holds = min(even, key=lambda h: _out_of_place(_restore(tracks, [0], [h]), model))
+    fixed = _restore(tracks, [0], [holds])
     return replace(fixed, problems=(*tracks.problems, *_describe(tracks, [0], [holds])))
 
 

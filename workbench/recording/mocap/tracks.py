@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording import quaternions as quat
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 FARTHEST = 1000.0
 """Largest distance from the capture's origin [m]; no capture volume is larger."""
@@ -34,7 +33,7 @@ class Tracks:
     p: Array
     q: Array
     seconds_squared: Array
-    mended: NDArray[np.bool_]
+    mended: Mask
     problems: tuple[str, ...] = ()
 
     def index(self, asset: str) -> int:
@@ -42,7 +41,7 @@ class Tracks:
         return self.assets.index(asset)
 
     @cached_property
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> Mask:
         """(A, N) where both position and rotation are known."""
         return np.asarray(np.isfinite(self.p).all(axis=-1) & np.isfinite(self.q).all(axis=-1))
 
@@ -109,7 +108,7 @@ def tracks_of(recording: Recording) -> Tracks:
                   tuple(problems))
 
 
-def _odd(asset: str, norm: Array, far: NDArray[np.bool_]) -> list[str]:
+def _odd(asset: str, norm: Array, far: Mask) -> list[str]:
     """Problems of a body's numbers: quaternions that are not of unit length, positions outside any capture volume."""
     out = []
     lengths = norm[np.isfinite(norm) & (norm > 0)]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.mocap.tracks import Tracks
 from workbench.recording.runs import runs_of_true
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 _APART = 0.02
 """Least distance [m] from a lost body at the origin to where it is seen before or after: no walking robot gets as far in a
@@ -51,7 +50,7 @@ def without_unseen(tracks: Tracks) -> Tracks:
     return replace(tracks, p=p, q=q, problems=tuple(problems))
 
 
-def _lost(p: Array, q: Array) -> NDArray[np.bool_]:
+def _lost(p: Array, q: Array) -> Mask:
     """(N,) frames exactly at the origin and unturned, in runs that begin or end with a leap."""
     at = (p == 0).all(axis=1) & (q[:, 1:] == 0).all(axis=1)
     seen = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(q).all(axis=1))
@@ -62,7 +61,7 @@ def _lost(p: Array, q: Array) -> NDArray[np.bool_]:
     return at if np.all(step[edge] > _APART) else np.zeros(len(p), dtype=bool)
 
 
-def _repeats(p: Array, q: Array) -> NDArray[np.bool_]:
+def _repeats(p: Array, q: Array) -> Mask:
     """(N,) frames that repeat the pose seen before to the last digit, in a body whose poses are noisy."""
     held = np.zeros(len(p), dtype=bool)
     poses = np.hstack([p, q])
@@ -108,7 +107,7 @@ def _last_digit(values: Array) -> float:
     return 0.0
 
 
-def _longest(held: NDArray[np.bool_]) -> tuple[int, int]:
+def _longest(held: Mask) -> tuple[int, int]:
     """First frame and length of the longest run."""
     first, end = max(runs_of_true(held), key=lambda run: run[1] - run[0])
     return first, end - first

@@ -68,7 +68,7 @@ def _prepare(recording: Recording, model: RobotModel) -> Tracks:
 
 
 def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], base: str = "free") -> YawEstimate:
-    """As `session_yaw`, of tracks."""
+    """The same as `session_yaw`, from tracks."""
     evidence: list[_Evidence] = []
     for tracks in takes:
         for joint in seen_joints(tracks.assets, model, base)[0]:

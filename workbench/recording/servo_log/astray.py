@@ -6,10 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files.problem import RemovedReadings
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def without_astray(time: Array, position: Array, c: AstrayChecks = ASTRAY) -> tu
                                  "answer; taken out")]
 
 
-def _off(values: Array, c: AstrayChecks) -> NDArray[np.bool_]:
+def _off(values: Array, c: AstrayChecks) -> Mask:
     """Which of values (N,) go out and come back within `rows`, further than their neighbours go."""
     off = np.zeros(len(values), dtype=bool)
     for width in range(1, c.rows + 1):
@@ -85,7 +84,7 @@ def _excursions(values: Array, width: int, c: AstrayChecks) -> list[int]:
     return out
 
 
-def _alone(values: Array, c: AstrayChecks) -> NDArray[np.bool_]:
+def _alone(values: Array, c: AstrayChecks) -> Mask:
     """Which of values (N,) lie outside the range of their neighbours by more than `again` times that range."""
     off = np.zeros(len(values), dtype=bool)
     before, here, after = values[:-2], values[1:-1], values[2:]

@@ -82,10 +82,10 @@ def duty_of(column: Array, error: Array, on: Mask, c: RegisterChecks = REGISTER)
     if whole[known].min() < 0 or size[known].max() > FULL or not signs.any() or signs.all():
         return None
     duty = np.where(whole >= SIGN, 1.0, -1.0) * size / FULL
-    told = known & on & np.isfinite(error) & (size < FULL) & (size > 0)
-    if told.sum() < c.fewest / 2 or np.std(error[told]) == 0 or np.std(duty[told]) == 0:
+    informative = known & on & np.isfinite(error) & (size < FULL) & (size > 0)
+    if informative.sum() < c.fewest / 2 or np.std(error[informative]) == 0 or np.std(duty[informative]) == 0:
         return None
-    follows = float(np.corrcoef(duty[told], error[told])[0, 1])
+    follows = float(np.corrcoef(duty[informative], error[informative])[0, 1])
     return None if abs(follows) < c.follows else np.asarray(np.where(known, np.copysign(1.0, follows) * duty, np.nan))
 
 
@@ -138,10 +138,10 @@ def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> Registe
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0))
     delay, slowness, p, zone, k = fit.x.tolist()
     ramp, sd = 1.0 / slowness, float(spread[1] / slowness**2)
-    told = sd < c.sure * ramp
-    errors = {"gain": gain * float(spread[4]), "delay": float(spread[0]), "ramp": sd if told else np.inf,
+    identified = sd < c.sure * ramp
+    errors = {"gain": gain * float(spread[4]), "delay": float(spread[0]), "ramp": sd if identified else np.inf,
               "minimum_duty": float(spread[2]), "dead_zone": float(spread[3])}
-    return RegisterLaw(gain * k, delay, ramp if told else np.inf, p, zone, missed, errors)
+    return RegisterLaw(gain * k, delay, ramp if identified else np.inf, p, zone, missed, errors)
 
 
 def _differences(residuals: Callable[[Array], Array], x: Array, scale: Array) -> Array:

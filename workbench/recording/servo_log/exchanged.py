@@ -32,7 +32,7 @@ EXCHANGE = ExchangeChecks()
 
 
 def find_exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -> dict[str, str]:
-    """By joint, the joint whose goals its position follows instead of its own."""
+    """For each exchanged joint, the joint whose goals its position follows instead of its own."""
     far = {j: log for j, log in logs.items() if min(np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))) >= c.goes}
     out = {}
     own_shares = {joint: abs(_explained_share(log, log, c)) for joint, log in far.items()}

@@ -43,8 +43,8 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
             lines.append(f"{name}: {text}")
             continue
         for read in (without_astray, without_no_answer, without_repeats):
-            channels[name], said = read(recording.time, channels[name])
-            lines += [name_problem(name, text) for text in said]
+            channels[name], texts = read(recording.time, channels[name])
+            lines += [name_problem(name, text) for text in texts]
     mended = replace(recording, channels=channels)
     logs = {j: log for j, log in joint_logs(mended).items() if j in joints}
     no_goals = set()
@@ -61,11 +61,11 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     for joint, log in logs.items():
         if joint in no_goals:
             continue
-        said = []
+        texts = []
         if joint not in coarse:
-            log, said = _undo_zero_shift(channels, log)
-            said += _blank_released(channels, recording, log)
-        lines += said or [f"position.{joint}: {text}" for text in list(held_back(log)) or unlike(log)]
+            log, texts = _undo_zero_shift(channels, log)
+            texts += _blank_released(channels, recording, log)
+        lines += texts or [f"position.{joint}: {text}" for text in list(held_back(log)) or unlike(log)]
     if not any("does not follow" in text for text in lines):
         alone = none_follows({j: log for j, log in logs.items() if j not in no_goals})
         lines += [alone] if alone else []
@@ -76,13 +76,13 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
 
 def _undo_zero_shift(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, list[str]]:
     name = f"position.{log.name}"
-    off, said = zero_shifts(log)
-    if not said:
+    off, texts = zero_shifts(log)
+    if not texts:
         return log, []
     values = channels[name].copy()
     values[log.rows] -= off
     channels[name] = values
-    return replace(log, position=log.position - off), [name_problem(name, text) for text in said]
+    return replace(log, position=log.position - off), [name_problem(name, text) for text in texts]
 
 
 def _blank_released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:

@@ -37,7 +37,7 @@ def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
     offset -= offset[_main(position[seen], part, offset)]
     count = count_of(position[seen][np.isin(part, np.flatnonzero(np.abs(offset) < _OFF + _JITTER))])
     wrap = 65536 * (count if np.isfinite(count) else resolution(position[seen]))
-    out, said = position.copy(), _Said(time, position)
+    out, report = position.copy(), _Said(time, position)
     short = max(_ASTRAY, len(seen) // 50)
     for k, jump in enumerate(offset):
         rows = seen[part == k]
@@ -47,16 +47,16 @@ def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
         whole = turns != 0 and abs(jump - turns * TURN) < _OFF * min(abs(turns), 2)
         if len(rows) <= short and not (wrap and abs(abs(jump) - wrap) < 0.02 * wrap):
             out[rows] = np.nan
-            said.add("a whole turn" if whole else "more than a servo turns", rows, jump)
+            report.add("a whole turn" if whole else "more than a servo turns", rows, jump)
         elif whole and abs(turns) < 8:
             out[rows] -= turns * TURN
-            said.add("turns", rows, jump)
+            report.add("turns", rows, jump)
         elif wrap and abs(abs(jump) - wrap) < 0.02 * wrap:
             out[rows] -= np.sign(jump) * wrap
-            said.add("a 16-bit register that wrapped", rows, jump)
+            report.add("a 16-bit register that wrapped", rows, jump)
         else:
-            said.add("no turn", rows, jump)
-    return out, said.lines()
+            report.add("no turn", rows, jump)
+    return out, report.lines()
 
 
 def _main(position: Array, part: NDArray[np.int_], offset: Array) -> int:

@@ -49,9 +49,9 @@ def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> list[tuple[int, int]]:
     span = float(log.time[-1] - log.time[0])
     best: list[tuple[int, int]] = []
     for share in c.prefixes:
-        told = log.time - log.time[0] <= share * span
-        fit = fit_response(shaped, log.position, told)
-        if fit.explained < c.before or fit.gain < c.firm or not _goes_back(log.goal[told], c):
+        early = log.time - log.time[0] <= share * span
+        fit = fit_response(shaped, log.position, early)
+        if fit.explained < c.before or fit.gain < c.firm or not _goes_back(log.goal[early], c):
             continue
         found = [s for s in _join(log, _stretches(log.time, log.position, fit, c), fit, c)
                  if log.time[s[1] - 1] - log.time[s[0]] >= c.lasts and _free(log, s, fit, c)]

@@ -22,7 +22,7 @@ from workbench.recording.servo_log.reversed_roles import reversed_roles
 from workbench.recording.servo_log.started import ramp_problems
 from workbench.recording.servo_log.supply import supply_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
-from workbench.types import Array
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         if joint in exchanged:
             channels[name] = np.full(len(time), np.nan)
         elif name in channels and not (goal is not None and _in_another_unit(goal)):
-            channels[name], said = without_leaps(time, channels[name])
-            problems += [name_problem(name, text) for text in said]
+            channels[name], texts = without_leaps(time, channels[name])
+            problems += [name_problem(name, text) for text in texts]
     read = replace(recording, channels=channels)
     for check in (_clock, _no_command):
         problems += check(read, checks)
@@ -200,7 +200,7 @@ def _left_behind(goal: Array, position: Array, first: int, c: LogChecks) -> bool
     return bool(np.rad2deg(np.nanmax(away[first:])) > c.far and np.nanmax(away[first:]) > c.leaps * before)
 
 
-def _commanded_joints(r: Recording) -> Iterator[tuple[str, Array, Array, NDArray[np.bool_]]]:
+def _commanded_joints(r: Recording) -> Iterator[tuple[str, Array, Array, Mask]]:
     """Joints with both goal and position: name, both (N,) [rad], and where torque was on."""
     for joint in r.joints:
         goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")

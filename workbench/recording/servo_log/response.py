@@ -59,9 +59,9 @@ def shapes(time: Array, goal: Array, c: ResponseChecks = RESPONSE) -> Array:
     return np.array(out)
 
 
-def fit_response(shaped: Array, position: Array, told: Mask | None = None, c: ResponseChecks = RESPONSE) -> Response:
+def fit_response(shaped: Array, position: Array, rows_used: Mask | None = None, c: ResponseChecks = RESPONSE) -> Response:
     """The best of the `shapes` (M, N) [rad] for positions (N,) [rad], fitted on the rows `told` (N,), all if left out."""
-    rows = np.flatnonzero(told) if told is not None else np.arange(len(position))
+    rows = np.flatnonzero(rows_used) if rows_used is not None else np.arange(len(position))
     nothing = Response(np.full(len(position), float(np.mean(position[rows])) if len(rows) else 0.0), 0.0, 0.0,
                        float(np.std(position[rows])) if len(rows) else 0.0, 0.0)
     if len(rows) < c.fewest or np.ptp(position[rows]) == 0:

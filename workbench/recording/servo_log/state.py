@@ -11,6 +11,9 @@ from workbench.recording.white_noise import white_noise
 from workbench.types import Array
 
 _FEW_STEPS = 10  # too few values to determine a count
+_OFF = 0.02
+"""Largest median distance of steps from whole multiples of a count, as a share of it: rounding to hundredths of it still
+passes."""
 _ROUNDED = 1e-6
 """Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""
 _CERTAIN = 3.0
@@ -33,7 +36,7 @@ def resolution(values: Array) -> float:
 
 
 def staying(values: Array) -> Array:
-    """Those of values (N,) that repeat in the next row: whole counts, even if the log interpolates between them on a clock of its
+    """Values of (N,) that repeat in the next row: whole counts, even if the log interpolates between them on a clock of its
     own."""
     values = values[np.isfinite(values)]
     return values[:-1][np.diff(values) == 0]
@@ -47,8 +50,8 @@ def count_that_stays(values: Array) -> float:
     return float(steps.min()) if len(steps) >= _FEW_STEPS else float("nan")
 
 
-def count_of(values: Array, off: float = 0.02) -> float:
-    """The number of which all steps between values (N,) are whole multiples, to `off` of it in the median: one count of a sensor,
+def count_of(values: Array) -> float:
+    """The number of which all steps between values (N,) are whole multiples, to _OFF of it in the median: one count of a sensor,
     more precise than `resolution` for values that were rounded when written. NaN if none is certain."""
     steps = np.diff(np.unique(values[np.isfinite(values)]))
     steps = steps[steps > 1e-3 * np.max(steps, initial=0.0)]
@@ -58,7 +61,7 @@ def count_of(values: Array, off: float = 0.02) -> float:
     for _ in range(3):  # from the multiples, the larger the better
         count = float(np.sum(steps) / np.sum(np.round(steps / count)))
     away = np.abs(steps / count - np.round(steps / count))
-    return count if np.all(away < 5 * off) and np.median(away) < off else float("nan")
+    return count if np.all(away < 5 * _OFF) and np.median(away) < _OFF else float("nan")
 
 
 def state_at(recording: Recording, joints: Sequence[str], time: float) -> tuple[Array, Array] | None:
@@ -83,8 +86,9 @@ def _at(time: Array, values: Array, when: float) -> float:
 
 
 def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
-    """As logged, else the slope of the first positions where that exceeds their noise: a robot that is not seen to move
-    is at rest, and in one that is stuck in its friction an initial velocity error would move it permanently."""
+    """A joint's velocity [rad/s], as logged, else the slope of the first positions where that exceeds their noise: a robot that
+    is not seen to move is at rest, and in one that is stuck in its friction an initial velocity error would move it
+    permanently."""
     speed = recording.channels.get(f"velocity.{joint}")
     if speed is not None and np.isfinite(speed).any():
         return _at(recording.time, speed, time)

@@ -56,15 +56,15 @@ def unit_problems(r: Recording, c: UnitChecks = UNITS) -> Iterator[str]:
     """A line for each channel that cannot be in its format's unit, or has another zero or sign."""
     found = {j: r.channels[f"position.{j}"] for j in r.joints if f"position.{j}" in r.channels}
     found = {j: p for j, p in found.items() if np.isfinite(p).any()}
-    told = set()
+    reported = set()
     for joint, position in found.items():
         for check in (_reach, _counted_in_radians, _against_goal):
             line = next(check(r, c, joint, position), None)
             if line is not None:
-                told.add(joint)
+                reported.add(joint)
                 yield line
                 break
-    if not told:
+    if not reported:
         yield from _all_in_radians(r, c, found)
     for joint, position in found.items():
         yield from _velocity(r, c, joint, position)

@@ -50,10 +50,13 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     extra = steps[1:-1] - (steps[:-2] + steps[2:]) / 2  # of step i + 1, beyond the mean of its neighbours
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     apart = np.diff(log.time) > c.pause * float(np.median(np.diff(log.time)))
-    inside = [int(k) for k in large if 2 <= k < len(steps) - 2 and not apart[k - 1:k + 2].any()]
+    large = large[(large >= 2) & (large < len(steps) - 2)]
+    inside = large[~(apart[large - 1] | apart[large] | apart[large + 1])]
+    sizes = np.abs(extra[inside - 1])
+    alone = inside[(sizes > np.deg2rad(c.least)) & (np.abs(steps[inside + 1] - steps[inside - 1]) < sizes / 3)]
     far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
-    at = [k for k in inside if _stands_out(steps, extra, k, c) and not _goal_stepped(log, k, extra[k - 1], c)] or \
-        [k for k in inside if _leaps(log, k, abs(extra[k - 1]), far) and not _goal_stepped(log, k, extra[k - 1], c)]
+    at = [k for k in alone.tolist() if _stands_out(extra, k, c) and not _goal_stepped(log, k, extra[k - 1], c)] or \
+        [k for k in inside[sizes > far].tolist() if _is_complete(log, k) and not _goal_stepped(log, k, extra[k - 1], c)]
     if not at:
         return none, []
     edges = [0, *(k + 1 for k in at), len(log.rows)]
@@ -75,20 +78,15 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     return off, [_line(log, off, edges)]
 
 
-def _leaps(log: JointLog, k: int, jump: float, far: float) -> bool:
-    """Whether step `k` is larger than the other steps of the log, with no row missing around it."""
-    around = slice(k - 2, k + 4)
-    return jump > far and bool(np.all(np.diff(log.rows[around]) == 1))
+def _is_complete(log: JointLog, k: int) -> bool:
+    """Whether no row is missing around step `k`."""
+    return bool(np.all(np.diff(log.rows[k - 2:k + 4]) == 1))
 
 
-def _stands_out(steps: Array, extra: Array, k: int, c: ShiftChecks) -> bool:
-    """Whether step `k` differs from its neighbours, which agree with each other, by more than nearby steps differ. extra: of step
-    i + 1."""
-    jump = abs(extra[k - 1])
-    if jump <= np.deg2rad(c.least) or abs(steps[k + 1] - steps[k - 1]) >= jump / 3:
-        return False
+def _stands_out(extra: Array, k: int, c: ShiftChecks) -> bool:
+    """Whether step `k` differs from its neighbours by more than nearby steps differ from theirs. extra: of step i + 1."""
     around = np.abs(np.concatenate([extra[max(k - 2 - c.near, 0):max(k - 2, 0)], extra[k + 1:k + 1 + c.near]]))
-    return bool(jump > c.times * float(np.max(around, initial=0.0)))
+    return bool(abs(extra[k - 1]) > c.times * float(np.max(around, initial=0.0)))
 
 
 def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:

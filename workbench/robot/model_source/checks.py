@@ -108,8 +108,8 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
 
 @cached_by_content(maxsize=32)
 def link_sizes(path: Path) -> dict[str, float]:
-    """By link, the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones [m], at
-    least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
+    """Size of each link: the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones
+    [m], at least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
     plant, scene_graph, instances = _build(path, path)
     bodies = [plant.get_body(b) for instance in instances for b in plant.GetBodyIndices(instance)]
     out = {}
@@ -134,12 +134,12 @@ def _fixed_together(plant: Any) -> dict[str, set[str]]:
 
 def _without_mass(plant: Any, groups: dict[str, set[str]]) -> Iterator[str]:
     floating = {plant.get_body(b).name() for b in plant.GetFloatingBaseBodies()}
-    told: set[str] = set()
+    reported: set[str] = set()
     for name, group in groups.items():
         mass = sum(plant.GetBodyByName(n).default_mass() for n in group)
-        if mass > 0 or told & group:
+        if mass > 0 or reported & group:
             continue
-        told |= group
+        reported |= group
         if floating & group:
             yield f"link '{name}': the base floats and weighs nothing (with all that is fixed to it)"
         else:

@@ -27,7 +27,7 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
     joints, links = root.findall("joint"), root.findall("link")
     taken = {j.get("name") for j in joints}
     names = {name: f"{name}_link" if name in taken else name for name in (k.get("name") or "" for k in links)}
-    said = [f"link '{a}' has a joint's name and is called '{b}'" for a, b in names.items() if a != b]
+    notes = [f"link '{a}' has a joint's name and is called '{b}'" for a, b in names.items() if a != b]
     carrier: dict[str, str] = {}
     for joint in joints:
         child = _end(joint, "child", path)
@@ -50,10 +50,10 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
             for k, shape in enumerate(link.findall(kind)):
                 _shape(out, shape, f"{kind}_{k}", colours, f"link '{name}'", path)
     for joint in joints:
-        said += _joint(model, joint, names, path)
+        notes += _joint(model, joint, names, path)
     for group in root.findall(f"{{{DRAKE}}}collision_filter_group"):
         _filter_group(model, group, names)
-    return sdf, said
+    return sdf, notes
 
 
 def _free_bases(joints: list[Element], links: list[Element], path: Path) -> tuple[set[str], set[str]]:
@@ -92,7 +92,7 @@ def _value(parent: Element, tag: str, text: str | None) -> None:
 
 
 def _inertial(out: Element, inertial: Element | None) -> None:
-    """As the URDF has it; SDF's own default would be 1 kg."""
+    """The inertial of a URDF link; a link without one gets no mass, as SDF's default would be 1 kg."""
     to = SubElement(out, "inertial")
     mass = None if inertial is None else inertial.find("mass")
     moments = None if inertial is None else inertial.find("inertia")

@@ -9,11 +9,14 @@ from xml.etree.ElementTree import Element
 
 from workbench.files import InputError
 from workbench.files.numerals import number_of
-from workbench.files.reading import regular_file
+from workbench.files.reading import read_bytes
 
 MOST_XML = 32 << 20
 """Largest description [bytes]; a robot of a hundred links has 0.1 MB."""
 MOST_DEPTH = 200
+"""Deepest nesting of elements; beyond it, a file is damaged or hostile."""
+MOST_INCLUDES = 20
+"""Files that include each other in a chain; beyond it, Drake's own parser is left to judge."""
 DRAKE = "http://drake.mit.edu"
 
 _NUMBERS = {**dict.fromkeys(("mass", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "lower", "upper", "effort", "velocity", "damping",
@@ -41,10 +44,7 @@ _CONVERTED = {
 
 def read_xml(path: Path) -> Element:
     """The root of a description; InputError where it is no whole XML, too large or nested too deep."""
-    try:
-        content = regular_file(path, MOST_XML).read_bytes()
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    content = read_bytes(path, MOST_XML)
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         raise InputError(path, "a DOCTYPE or entities; expected a plain description")
     ElementTree.register_namespace("drake", DRAKE)
@@ -73,7 +73,7 @@ _SIZES = ("size", "radius", "length")
 
 
 def _bound_prefix(content: bytes) -> bytes:
-    """With Drake's prefix bound, which Drake itself does not ask for."""
+    """The content with Drake's prefix bound, which Drake itself does not require."""
     if b"drake:" in content and b"xmlns:drake" not in content:
         for tag in (b"<sdf", b"<robot"):
             content = content.replace(tag, tag + f' xmlns:drake="{DRAKE}"'.encode(), 1)
@@ -90,7 +90,7 @@ def check_includes(path: Path, root: Element, seen: tuple[Path, ...] = ()) -> No
         target = (path.parent / uri.removeprefix("file://")).resolve()
         if target in seen:
             raise InputError(path, f"<include> '{uri}': the model includes itself")
-        if target.is_file() and len(seen) < 20:
+        if target.is_file() and len(seen) < MOST_INCLUDES:
             check_includes(target, read_xml(target), seen)
 
 

@@ -141,8 +141,7 @@ class CompiledJob:
     def take(self, as_seen: bool = True) -> Take:
         """Settles, plays, and reads the log; NotCoveredError where something touches in a way that is Drake's. as_seen: with
         angles as cameras see them where something is between servos and links; else servos' angles and velocities stand."""
-        log = self.log(self.schedule())
-        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - self.plan.lead, as_seen)
+        return self._read(self.log(self.schedule()), as_seen)
 
     def schedule(self) -> Schedule:
         """What happens when in this job."""
@@ -243,17 +242,21 @@ class CompiledJob:
             self.tables.derived[key] = Structure(self.model, self.physics)
         return self.tables.derived[key]  # type: ignore[return-value]
 
-    def _read(self, log: Log, time: np.ndarray, as_seen: bool = True) -> Take:
+    def _read(self, log: Log, as_seen: bool) -> Take:
         job, joint, config = self.job, self.machine.servos.joint, self.config
+        time = np.arange(len(log.q)) * config.logged_every - self.plan.lead
+        alike = np.array_equal(joint, np.arange(log.q.shape[1]))  # then there is nothing to copy
+        q, v = (log.q, log.v) if alike else (log.q[:, joint], log.v[:, joint])
         p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
         if not self.free:
             X = self.tables.X_WBase
-            p_WB = np.tile(X.translation(), (len(time), 1))
-            quat_WB = np.tile(RotationMatrix(X.rotation()).ToQuaternion().wxyz(), (len(time), 1))
-        take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=log.q[:, joint], starts_at=0.0,
-                    base=config.base, v=log.v[:, joint], p_WB=p_WB, quat_WB=quat_WB,
+            p_WB = np.broadcast_to(X.translation(), (len(time), 3))
+            quat_WB = np.broadcast_to(RotationMatrix(X.rotation()).ToQuaternion().wxyz(), (len(time), 4))
+        take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=q, starts_at=0.0,
+                    base=config.base, v=v, p_WB=p_WB, quat_WB=quat_WB,
                     torque=log.torque if len(log.torque) else None, contact=self._contact(log, time), commands=job.commands)
         take = self._as_built(take, log) if as_seen else take
+        del log  # of a recording of 1,000 s a hundred MB, more than half of which a held robot's take does not need
         return take if job.times is None else take.resampled(job.times)
 
     def _contact(self, log: Log, time: np.ndarray) -> dict[str, np.ndarray]:

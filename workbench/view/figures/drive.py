@@ -35,13 +35,13 @@ def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[
 
 @in_house_style
 def driven_cycles(closed: Driven, most: float) -> Figure:
-    """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, sideways stride
+    """Per cycle: lateral error [cm], heading error [deg], executed turn [rad per stance] with its limit, sideways stride
     [mm per stance], and the estimated turning bias [deg per cycle]. most: largest turn [rad per stance]."""
     figure = new_figure(9, 9.5)
     rows = figure.subplots(5, 1, sharex=True)
     cycles = np.arange(len(closed.turns))
     columns = {"left [cm]": 100 * closed.left, "heading [deg]": np.rad2deg(closed.off), "turn [rad]": closed.turns,
-               "side [mm]": 1000 * closed.sides, "bias [deg/cycle]": np.rad2deg(closed.bias)}
+               "sideways [mm]": 1000 * closed.sides, "bias [deg/cycle]": np.rad2deg(closed.bias)}
     for axes, (label, values) in zip(rows, columns.items()):
         axes.axhline(0, color="#999999", linewidth=0.8)
         axes.plot(cycles, values, ".-", color=ACCENT if label.startswith("bias") else SIMULATED)

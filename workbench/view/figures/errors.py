@@ -18,7 +18,8 @@ LIMIT = PROBLEM.gap_ratio
 
 @in_house_style
 def joint_errors(channels: Mapping[str, Channel]) -> Figure:
-    """RMS error of each joint, the largest over noise first, compared with the error that noise and numerics alone would cause.
+    """RMS error of each joint, sorted by the ratio to noise and numerics, compared with the error that noise and numerics alone
+    would cause.
 
     channels: joint -> error, noise, floor, spread [rad], shown in degrees. A bar beyond `LIMIT` times the root of noise² + floor²
     is orange: noise and numerics do not explain it.
@@ -32,15 +33,15 @@ def joint_errors(channels: Mapping[str, Channel]) -> Figure:
                                       ("spread between contact models", "spread", COMMAND, ":")):
         if any(getattr(c, key) > 0 for c in channels.values()):
             axes.plot([], [], color=colour, linestyle=style, linewidth=2, label=label)
-    axes.bar(0, 0, color=RECORDED, label=f"error beyond {LIMIT:g} times both")
-    axes.bar(0, 0, color=SIMULATED, label="error within")
+    axes.bar(0, 0, color=RECORDED, label=f"error above {LIMIT:g}× both")
+    axes.bar(0, 0, color=SIMULATED, label="error below")
     axes.set_yticks(range(len(order)), order)
     axes.set_ylim(len(order) - 0.4, -0.6)
     axes.margins(x=0.16)
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
     axes.set_xlabel("RMS error after the first command [deg]")
-    axes.set_title("error of each joint, the largest over noise first")
+    axes.set_title("error of each joint, sorted by the ratio to noise and numerics")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 

@@ -13,7 +13,7 @@ from workbench.view.figures.style import ACCENT, COMMAND, FLOOR, RECORDED, SIMUL
 
 @in_house_style
 def limit_bars(certificate: Certificate) -> Figure:
-    """The worst use of each limit, as value over limit: above 1 the limit is exceeded. Recommendations are hatched."""
+    """The worst value of each limit, relative to the limit: above 1 the limit is exceeded. Recommendations are hatched."""
     rows = sorted(each(certificate.margins), key=lambda item: item[1].use)
     figure = new_figure(10, 0.42 * len(rows) + 1.2)
     axes = figure.add_subplot()
@@ -28,13 +28,13 @@ def limit_bars(certificate: Certificate) -> Figure:
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.axvline(1.0, color=RECORDED, linewidth=1.4)
     axes.set_xlim(0, max(1.9, max(min(m.use, 2.6) for _, m in rows) + 0.9))
-    axes.set_xlabel("value over limit")
+    axes.set_xlabel("value / limit")
     axes.grid(axis="y", visible=False)
     return figure
 
 
 def short(value: float) -> str:
-    """Three digits; a value far below any limit's precision is 0."""
+    """Three digits; a negligible value becomes 0."""
     return "0" if abs(value) < 1e-3 else f"{value:.3g}"
 
 

@@ -46,8 +46,9 @@ def gap_map(take: TakeReport) -> Figure:
     mesh = None
     for axes, residual, title in zip(panels, (take.before, take.after), ("nominal model", "fitted model")):
         mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells(time, residual, edges), cmap=HEAT, norm=SCALE, rasterized=True)
-        for low, high in intervals(time, take.unseen & (time >= 0)):
-            axes.plot([low, high], [-0.35, -0.35], color=ACCENT, linewidth=4, solid_capstyle="butt", clip_on=False)
+        held_out = intervals(time, take.unseen & (time >= 0))
+        ends = np.column_stack([held_out, np.full(len(held_out), np.nan)]).ravel()  # one line with gaps: a long take has hundreds
+        axes.plot(ends, np.full(len(ends), -0.35), color=ACCENT, linewidth=4, solid_capstyle="butt", clip_on=False)
         axes.set_ylim(rows, -0.6)
         axes.set_yticks(np.arange(rows) + 0.5, take.channels, fontsize=9)
         axes.grid(False)
@@ -98,7 +99,7 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
     axes.set_axis_off()
-    axes.set_title("error over noise and numerics, before")
+    axes.set_title("error / noise and numerics, nominal model")
     return figure
 
 
@@ -165,7 +166,7 @@ def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
     figure = new_figure(12, 0.24 * len(order) + 1.7)
     panels = figure.subplots(1, len(takes), sharey=True, squeeze=False)[0]
     for axes, take, (before, after) in zip(panels, takes, ratios):
-        axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g} times")
+        axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g}×")
         rows = [i for i, c in enumerate(order) if np.isfinite(before.get(c, np.nan))]
         b, a = ([values[order[i]] for i in rows] for values in (before, after))
         axes.hlines(rows, b, a, color=COMMAND, linewidth=1.2, zorder=2)
@@ -174,7 +175,7 @@ def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
         axes.set_xlim(left=0)
         axes.grid(False, axis="y")
         axes.set_title(take.name)
-        axes.set_xlabel("error over noise and numerics")
+        axes.set_xlabel("error / noise and numerics")
     panels[0].set_yticks(range(len(order)), order, fontsize=10)
     panels[0].set_ylim(len(order) - 0.4, -0.6)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)

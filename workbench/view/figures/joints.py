@@ -37,7 +37,7 @@ def joint_overlay(
     joint: str, simulated: Take, recorded: Take | None = None, *, noise: float | None = None, floor: float | None = None,
     stance: Stance | None = None, span: tuple[float, float] | None = None,
 ) -> Figure:
-    """Command, measured and simulated angle of one joint, the error under them.
+    """Command, measured and simulated angle of one joint, with the error below.
 
     noise, floor: standard deviation of the measurement and numerical floor of the simulation [rad], drawn as a band about
     zero error. stance: by joint (`by_joint`), of the recorded robot, or of the simulated one alone; shades the time in which
@@ -148,7 +148,7 @@ def _draw_error(axes: Axes, joint: str, simulated: Take, recorded: Take, noise: 
     axes.plot(clock, error, color=ERROR, linewidth=1.1, zorder=3)
     axes.set_ylabel("error [deg]")
     names = names_of(simulated, recorded)
-    title = f"{names[1]} less {names[0]}: {', '.join(says)}" + (" (band: ±2σ of both)" if band > 0 else "")
+    title = f"{names[1]} minus {names[0]}: {', '.join(says)}" + (" (band: ±2σ of both)" if band > 0 else "")
     axes.set_title(title, fontsize=11, fontweight="normal")
 
 

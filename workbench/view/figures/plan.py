@@ -21,9 +21,9 @@ def plan_and_run(c: PlanComparison) -> Figure:
         for i, foot in enumerate(c.feet):
             feet.plot(c.phases, 1000 * motion.feet[:, i, 2] + 40 * i, color=colour, label=name if i == 0 else None)
             feet.annotate(foot, (1.0, 40 * i), xytext=(4, 0), textcoords="offset points")
-    base.set_ylabel("base, off the planned mean")
+    base.set_ylabel("base, relative to the planned mean")
     base.legend(loc="upper right", ncols=2, fontsize=9)
-    feet.set_ylabel("feet's heights [mm], 40 apart")
-    feet.set_xlabel("share of the cycle")
+    feet.set_ylabel("foot heights [mm], offset by 40")
+    feet.set_xlabel("fraction of the cycle")
     feet.legend(loc="upper right", fontsize=9)
     return figure

@@ -1,4 +1,4 @@
-"""Load of the servos, their limits, and the wrench that no contact explains."""
+"""Load of the servos, their limits, and the wrench on the base that contacts cannot supply."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def joint_torques(
 @in_house_style
 def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array, v: Array) -> Figure:
     """The load of each servo. Left: motor torque over joint speed of each sample, inside the servo's limits at its supply
-    voltage. Right: the largest share of its torque that each joint uses, and of the no-load speed.
+    voltage. Right: peak torque and speed of each joint, relative to the available torque and the no-load speed.
 
     motor_torque: (N, n) [N m] of motor and gear, with reflected inertia and friction. v: (N, n) [rad/s].
     """
@@ -59,7 +59,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
             plane.plot(np.degrees(speed), sign * servo.line.motor_torque(sign * speed), color="#888888",
                        linewidth=1.2, label="servo at full duty" if sign > 0 else None)
         plane.axhspan(-servo.stall_torque / 5, servo.stall_torque / 5, color=STANCE, linewidth=0, zorder=0.5,
-                      label="a fifth of stall torque, advised")
+                      label="a fifth of stall torque (recommended limit)")
     share_torque, share_speed = _shares(model, joints, motor_torque, v)
     few = np.linspace(0, len(v) - 1, min(len(v), 1500)).astype(int)[:, None]
     for part, (label, colour) in _PARTS.items():
@@ -72,11 +72,11 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
     plane.set_ylim(-reach, reach)
     plane.set_xlabel("joint speed [deg/s]")
     plane.set_ylabel("motor torque [N m]")
-    plane.set_title("required of the servos")
+    plane.set_title("torque and speed required of the servos")
     rows = np.arange(len(joints))
     over = np.maximum(share_torque, share_speed) > 1
-    bars.barh(rows - 0.2, 100 * share_torque, 0.36, color=SIMULATED, label="torque at that speed")
-    bars.barh(rows + 0.2, 100 * share_speed, 0.36, color=OTHERS[1], label="no-load speed")
+    bars.barh(rows - 0.2, 100 * share_torque, 0.36, color=SIMULATED, label="torque (limit at that speed)")
+    bars.barh(rows + 0.2, 100 * share_speed, 0.36, color=OTHERS[1], label="speed (limit at no load)")
     bars.axvline(100, color=RECORDED, linewidth=1.4)
     bars.set_yticks(rows, list(joints))
     for label, beyond in zip(bars.get_yticklabels(), over):
@@ -84,7 +84,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
             label.set(color=RECORDED, fontweight="bold")
     bars.invert_yaxis()
     bars.grid(False, axis="y")
-    bars.set_xlabel("largest share of the servo's limit [%]")
+    bars.set_xlabel("peak, relative to the servo's limit [%]")
     figure.legend(*_merge_legends(plane, bars), loc="outside lower center", ncols=4)
     return figure
 
@@ -93,7 +93,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
 def base_wrench(
     time: Array, residual: Array, sigma: Array | None = None, *, weight: float | None = None,
 ) -> Figure:
-    """The wrench on the base that the motion requires and that no contact inside the friction cone can supply.
+    """The wrench on the base that the motion requires and that contacts inside the friction cone cannot supply.
 
     time: (N,) [s] on the take's clock. residual: (N, 6) [moment about the base's origin N m, force N] in the world. sigma: (N,
     6), its standard deviation from the measurement's noise, drawn as ±2σ. weight: of the robot [N], for scale.
@@ -110,7 +110,7 @@ def base_wrench(
             axes.plot(time, values, color=colours[k], linewidth=1.1, label=name)
         axes.axhline(0, color="#999999", linewidth=0.8)
         size = float(rms(np.linalg.norm(residual[:, first : first + 3], axis=1)))
-        says = f"{what} that no contact supplies: {size:.3g} {unit} RMS"
+        says = f"{what} that contacts cannot supply: {size:.3g} {unit} RMS"
         if weight and first == 3:
             says += f", {100 * size / weight:.0f} % of the weight"
         axes.set_title(says)
@@ -122,7 +122,7 @@ def base_wrench(
 
 
 def _shares(model: RobotModel, joints: Sequence[str], torque: Array, v: Array) -> tuple[Array, Array]:
-    """Largest share of the torque that the servo has at the moment's speed, and of its no-load speed, per joint."""
+    """Largest ratio of torque to the torque available at the current speed, and of speed to no-load speed, per joint."""
     line = ServoLaw.of([model.servo(j) for j in joints]).line
     left = np.maximum(line.motor_torque(v * np.sign(torque)), 0.05 * line.full_torque)
     return np.nanmax(np.abs(torque) / left, axis=0, initial=0), np.nanmax(np.abs(v) / line.no_load_speed, axis=0, initial=0)

@@ -10,9 +10,9 @@ from workbench.robot.torque_table import UNITS
 from workbench.view.figures.style import NOISE, SIMULATED, in_house_style, new_figure
 
 _LABELS = {"angle": "angle", "angle and direction": "angle, times the direction of motion", "duty": "duty",
-           "duty and direction": "size of the duty, times the direction of motion", "speed": "speed"}
+           "duty and direction": "absolute duty, times the direction of motion", "speed": "speed"}
 _NORMAL90 = 1.645
-"""Standard deviations on either side of the middle that hold 90 %."""
+"""Half width of a 90 % interval in standard deviations."""
 
 
 @in_house_style

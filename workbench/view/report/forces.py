@@ -18,7 +18,8 @@ _MEASURED = ("sd: from the measurement noise, amplified by differentiating the a
 
 
 def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[str, Figure]:
-    """Figures by name: torque of each joint, margins of each servo, and on a free base the wrench that no contact supplies."""
+    """Figures by name: torque of each joint, margins of each servo, and for a free base the wrench that contacts cannot
+    supply."""
     limit = {j: model.servo(j).torque_at_full_duty for j in result.joints}
     torques = {"on the link": result.torque, "of the motor": result.motor_torque}
     figures = {"torques": joint_torques(result.time, result.joints, torques, limit=limit),
@@ -30,9 +31,8 @@ def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[s
 
 
 def margin_table(result: InverseDynamicsResult) -> str:
-    """A line for each servo, the one with least torque left first, each margin with its standard deviation where the motion was
-    measured."""
-    lines = ["joint     rms    peak   left   N m           speed left   rad/s        time above a fifth of stall torque"]
+    """A line for each servo, sorted by torque margin; each margin with its standard deviation if the motion was measured."""
+    lines = ["joint     rms    peak margin   N m           speed margin rad/s        time above a fifth of stall torque"]
     for joint, load in sorted(result.loads.items(), key=lambda item: item[1].torque_margin):
         lines.append(f"{joint:6s} {load.rms:6.2f}  {load.peak:6.2f} {_with(load.torque_margin, load.torque_sigma)}     "
                      f"{_with(load.speed_margin, load.speed_sigma)}     {100 * load.beyond_fifth:5.0f} %{_mark(load)}")

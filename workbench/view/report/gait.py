@@ -167,7 +167,7 @@ def _draws_section(certificate: Certificate) -> Section:
         parts += [Text(f"{d['count']} newly sampled robots, none of which the search used: friction, supply voltage and its "
                        f"sag, masses, a load, zero offsets, backlash and latency vary at once. {d['falls'] or 'None'} fell; the "
                        f"probability of a fall is below {100 * d['falls at most']:.1f} % (at 95 % confidence)."),
-                  *([Table(["sample", "robot", "what happened"], incidents)] if incidents else []),
+                  *([Table(["sample", "robot", "event"], incidents)] if incidents else []),
                   Picture(draw_ranges(certificate), "Thick line: 5 to 95 % of the robots; thin line: all; circle: median; green: "
                           "nominal robot.")]
     trimmed = d.get("straightened")
@@ -205,7 +205,7 @@ def _way_section(certificate: Certificate) -> Section:
 
 
 def _cycle_parts(certificate: Certificate) -> list[Part]:
-    """Whether the gait comes back to its cycle, and how much its cycles differ."""
+    """Whether the gait returns to its limit cycle, and the scatter from cycle to cycle."""
     c = certificate.cycle
     said = (f"From cycle to cycle the heading scatters by {c.heading:.2g} deg and the speed by {100 * c.speed:.2g} cm/s "
             "(standard deviations, nominal robot)")
@@ -215,7 +215,7 @@ def _cycle_parts(certificate: Certificate) -> list[Part]:
     if c.back:
         never = f"not within {c.watched}"
         rows = [[entry, "fell" if entry in c.fell else never if n is None else str(n)] for entry, n in c.back.items()]
-        parts.append(Table(["entry or disturbance", "cycles until it walks as from neutral"], rows,
+        parts.append(Table(["entry or disturbance", "cycles until the gait has settled"], rows,
                            "Criterion: forward and sideways speed and turn of a cycle within a tenth of the settled gait's."))
     return parts
 

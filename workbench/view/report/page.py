@@ -50,7 +50,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Replay:
-    """A 3D replay that `write_replay` wrote, inside the page; it loads on request. poster: what is shown until then and in print,
+    """A 3D replay that `write_replay` wrote, inside the page; it loads on request. poster: shown until then and in print,
     ideally a `film_strip`."""
 
     path: str | Path

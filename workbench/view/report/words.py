@@ -15,7 +15,7 @@ from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import EffectSpec
 
 NAMED = 0.1
-"""A rival this probable is named wherever the finding is."""
+"""An alternative at least this probable is named together with the finding."""
 LAYERS: dict[Layer, str] = {
     "timing": "when commands take effect", "actuator": "how servos behave", "structure": "how links and joints are built",
     "inertia": "how mass is distributed", "ground": "how the floor acts", "measurement": "how the motion was measured"}
@@ -68,7 +68,7 @@ def probable(p: float) -> str:
 
 
 def rival_of(finding: Finding) -> Alternative | None:
-    """The alternative that is likely enough to be named wherever the finding is."""
+    """The alternative that is likely enough to be named together with the finding."""
     return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
 
 
@@ -96,7 +96,7 @@ def name_of(effect: str) -> str:
 
 
 def in_words(statement: Statement) -> str:
-    """A reason or a description with effects as a person calls them: "ground friction takes …"."""
+    """A reason or a description with readable names of effects: "ground friction takes …"."""
     return statement.in_words(title_of)
 
 

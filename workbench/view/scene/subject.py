@@ -1,4 +1,4 @@
-"""What a file holds to be viewed: a robot, a session, or a take."""
+"""The content of a file to view: a robot, a session, or a take."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Registers:
         self._places = (ctypes.c_void_p * len(numbers))(*(ctypes.addressof(self._values) + size * k for k in range(len(numbers))))
 
     def read(self) -> list[int]:
-        """Their values, in order."""
+        """Values of registers, in order."""
         uclib.uc_reg_read_batch(self._handle, self._numbers, self._places, self._count)
         return self._values[:]
 

@@ -20,7 +20,7 @@ class Peripheral:
         self.words = dict.fromkeys(self.known, 0)
 
     def reset(self) -> None:
-        """As after a reset of the chip."""
+        """The state after a reset of the chip."""
         self.words = dict.fromkeys(self.known, 0)
 
     def read(self, offset: int) -> int:

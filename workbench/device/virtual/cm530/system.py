@@ -27,7 +27,7 @@ class Clocks(Peripheral):
         self.hertz = self.slow_hertz = INTERNAL_HERTZ
 
     def reset(self) -> None:
-        """All gates shut, internal oscillator."""
+        """Closes all gates and selects the internal oscillator."""
         super().reset()
         self.words[0] = 0x83
         self._set_clocks()
@@ -183,7 +183,7 @@ class Port(Peripheral):
         self._outputs = 0
 
     def reset(self) -> None:
-        """All inputs."""
+        """Makes all pins inputs."""
         super().reset()
         self.words[0] = self.words[4] = 0x44444444
         self._outputs = 0

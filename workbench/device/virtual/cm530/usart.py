@@ -131,7 +131,7 @@ class Usart(Peripheral):
         return bool(self.words[CR1] & (UE | RE) == UE | RE and self.words[CR3] & DMAR)
 
     def receive(self, value: int) -> None:
-        """One byte has come in."""
+        """Receives one byte."""
         if self.words[CR1] & (UE | RE) != UE | RE:
             return
         if self.words[SR] & RXNE:
