@@ -36,8 +36,8 @@ def without_mimics(sdf: Element) -> list[str]:
     """Takes away the couplings of joints to others, which servos do not have; a line for each."""
     said = []
     for joint in sdf.iter("joint"):
-        for axis in (joint.find("axis"), joint.find("axis2")):
-            for mimic in [] if axis is None else axis.findall("mimic"):
+        for axis in (*joint.findall("axis"), *joint.findall("axis2")):
+            for mimic in axis.findall("mimic"):
                 axis.remove(mimic)
                 said.append(mimics(joint.get("name"), mimic.get("joint")))
     return said
