@@ -28,6 +28,7 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
+from workbench.types import Array
 
 T = TypeVar("T")
 ENDED = {TOUCHED: "shapes touch that are neither a foot on the floor nor a sphere on another link"}
@@ -244,7 +245,7 @@ class CompiledJob:
 
     def _read(self, log: Log, as_seen: bool) -> Take:
         job, joint, config = self.job, self.machine.servos.joint, self.config
-        time = np.arange(len(log.q)) * config.logged_every - self.plan.lead
+        time: Array = np.arange(len(log.q)) * config.logged_every - self.plan.lead
         alike = np.array_equal(joint, np.arange(log.q.shape[1]))  # then there is nothing to copy
         q, v = (log.q, log.v) if alike else (log.q[:, joint], log.v[:, joint])
         p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
