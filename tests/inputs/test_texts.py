@@ -46,7 +46,8 @@ def test_servo_constants_are_refused(tmp_path: Path, old: str, new: str, said: s
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [
-    ("stall_torque: 1.5", "stall_torque: 15.3", "kg cm"), ("no_load_speed: 6.18", "no_load_speed: 59", "rpm")])
+    ("stall_torque: 1.5", "stall_torque: 15.3", "kg cm"), ("no_load_speed: 6.18", "no_load_speed: 59", "rpm"),
+    ("compliance_slope: 32\ncompliance_margin: 1\npunch: 32", "proportional_gain: 800", "the register's own units")])
 def test_constants_of_another_unit_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
                                             said: str) -> None:
     (tmp_path / "servo.yaml").write_text(SERVO.replace(old, new))

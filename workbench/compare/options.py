@@ -60,6 +60,15 @@ class FileLimits:
     """Median time between a motion's poses [s] above which the times are probably milliseconds; no gait or test rests as long."""
     fewest_frames: int = 20
     """Of a take."""
+    longest_name: int = 100
+    """Of a take [bytes]: files are named after it, and file systems take 255 with what is put about it."""
+    moves_at_once: float = radians(30.0)
+    """Speed of a joint in a capture's first frames [rad/s] at which the robot does not stand. Where the bundled synthetic walk is
+    cut within its gait, a third of its joints or more are faster at 33 of 36 places; at rest none is."""
+    first_frames: float = 0.03
+    """A joint has to be so fast through two stretches of this duration [s]."""
+    share_moving: float = 1 / 3
+    """Share of the joints seen that move so."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from workbench.recording.formats.read import read_recording
 from workbench.recording.joint_names import named_by_model
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
+from workbench.recording.mocap.standing import moving_at_start
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.mocap.yaw import session_yaw
 from workbench.recording.recording import Measurement, Recording
@@ -115,13 +116,29 @@ def readable(path: Path, model: RobotModel) -> Recording:
     if len(recording.time) < FILES.fewest_frames:
         raise InputError(path, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
     if recording.channels:
-        return named_by_model(recording, model)
+        log = named_by_model(recording, model)
+        read = [values for name, values in log.channels.items() if name.startswith("position.")]
+        if read and not any(np.isfinite(values).any() for values in read):
+            why = "".join(f"; {text}" for text in recording.problems[:1])
+            raise InputError(path, f"no joint has a position to compare with{why}")
+        return log
     if not recording.rigid_bodies:
         found = f"{len(recording.markers)} markers" if recording.markers else "nothing"
         raise InputError(path, f"expected rigid bodies or joint channels, found {found}")
     if not any(np.isfinite(b.p).any() and b.quat.any() for b in recording.rigid_bodies.values()):
         raise InputError(path, "no rigid body was seen in any frame")
+    if all(model.rigid_bodies.get(asset) in model.kinematics.links for asset in recording.rigid_bodies):
+        _check_stands(path, recording, model)
     return recording
+
+
+def _check_stands(path: Path, recording: Recording, model: RobotModel) -> None:
+    """InputError where a captured robot moves when its recording begins: its angles would count from a pose of the motion."""
+    moving, seen = moving_at_start(recording, model, FILES.first_frames, FILES.moves_at_once)
+    if seen and len(moving) >= FILES.share_moving * seen:
+        names = ", ".join(moving[:3]) + (", …" if moving[3:] else "")
+        raise InputError(path, f"the robot moves when the recording begins ({names}); expected it to stand in its neutral pose "
+                               "before the first command, as its angles count from there")
 
 
 def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) -> LeftOut:

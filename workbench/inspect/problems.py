@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,9 +101,29 @@ def session_check(session: Session) -> SessionCheck:
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
         found[Part("predict")] = ["no take tells the yaw of the capture: it is estimated to a few degrees from the bodies' "
                                   "positions at the start; give the session's `yaw` [deg], or a captured take"]
+    for name, others in recorded_twice(session).items():
+        found.setdefault(Part("take", name), []).insert(
+            0, f"has the same recording as {others}: what is fitted to one is not held out in the other; leave one out")
     longest = max(seconds, key=lambda part: seconds[part])
     doubtful = {part: lines for part, lines in found.items() if lines}
     return SessionCheck(doubtful, seconds[longest], str(longest or ""), frozenset(damaged), mistyped or refused)
+
+
+def recorded_twice(session: Session) -> dict[str, str]:
+    """Takes whose recordings are the same, byte by byte, as those of earlier ones, with the first of these."""
+    first: dict[bytes, str] = {}
+    out = {}
+    for take in session.takes:
+        file, part = take.recording, ""
+        if not file.is_file():
+            whole, _, part = str(file).partition("#")  # one programme or episode of a file
+            file = Path(whole)
+        if not file.is_file():
+            continue
+        said = hashlib.sha256(file.read_bytes()).digest() + part.encode()
+        if first.setdefault(said, take.name) != take.name:
+            out[take.name] = f"take '{first[said]}'"
+    return out
 
 
 def _no_yaw(session: Session) -> str | None:
@@ -144,8 +165,21 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
     elif model is not None:
         named = named_by_model(recording, model)
         frames = model.kinematics.frames
+        out += _not_logged(named, model)
         out += beyond_range(named, {j: (frames[j].lower, frames[j].upper) for j in model.joints})
     return sorted(dict.fromkeys(out), key=lambda text: isinstance(text, RoutineProblem))
+
+
+def _not_logged(log: Recording, model: RobotModel) -> list[str]:
+    """Joints of the model of which a log lacks the goals or the readings; its commands may come from the session's motion."""
+    lacking = [j for j in model.joints if log.commands is not None and j not in log.commands.joints]
+    unread = [j for j in model.joints if j not in lacking and not np.isfinite(log.channels.get(f"position.{j}", np.nan)).any()]
+    out = []
+    if lacking:
+        out.append(f"the log has no goals of {', '.join(lacking)}: simulated as held at zero")
+    if unread:
+        out.append(f"the log has no readings of {', '.join(unread)}: its goals are simulated and compared with nothing")
+    return out
 
 
 def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:

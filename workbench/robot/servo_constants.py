@@ -215,8 +215,9 @@ _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "r
 _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
            "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
            "coulomb_friction": (2.0, "N m", "kg cm"), "viscous_friction": (1.0, "N m s/rad", "another unit"),
-           "reflected_inertia": (0.2, "kg m^2", "another unit")}
-"""XH540 (11.7 N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V)."""
+           "reflected_inertia": (0.2, "kg m^2", "another unit"),
+           "proportional_gain": (100.0, "duty per radian", "the register's own units")}
+"""XH540 (11.7 N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V), XL-330 at its highest gain (47)."""
 _LEAST = {"stall_torque": (0.02, "N m"), "no_load_speed": (0.5, "rad/s"), "rated_voltage": (2.0, "V"),
           "supply_voltage": (2.0, "V")}
 """Servos of 2 g (0.05 N m), geared down to a turn in ten seconds, one cell."""

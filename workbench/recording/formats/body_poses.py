@@ -17,6 +17,8 @@ from workbench.recording.recording import Recording
 
 PLACE, TURN = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _MM = "_mm"
+_MOST = 5
+"""Of a body's seven columns."""
 
 
 def _bodies(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
@@ -30,11 +32,9 @@ def _bodies(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
 
 
 def matches(head: bytes) -> bool:
-    """Whether the header has a time and, for at least one body, a position and a quaternion by these names."""
-    if is_binary(head):
-        return False
-    names = table_header(head).names
-    return "time" in names and any(set(of) == {*PLACE, *TURN} for of in _bodies(names).values())
+    """Whether the header has most columns of at least one body's position and quaternion by these names, so that the missing one
+    can be named."""
+    return not is_binary(head) and any(len(of) >= _MOST for of in _bodies(table_header(head).names).values())
 
 
 def read_body_poses(path: Path) -> Recording:
@@ -44,6 +44,8 @@ def read_body_poses(path: Path) -> Recording:
     content, _ = table_bytes(path)
     header = table_header(content)
     bodies = _bodies(header.names)
+    if "time" not in header.names:
+        raise InputError(source, f"line {header.lines}: expected a column 'time' [s], found {', '.join(header.names[:4])} …")
     for body, of in bodies.items():
         lacking = [w for w in (*PLACE, *TURN) if w not in of]
         if lacking:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording import quaternions as quat
@@ -23,6 +24,11 @@ _THIN = 0.05
 """A body whose markers lie on a line, to this share of its length, has no rotation about it."""
 _SLOWEST, _FARTHEST = 0.5, 20.0
 """Frames this far apart [s], or positions this far from each other [m], cannot come from a small robot in a room."""
+
+_LOST = 1.5
+"""A step of more than so many usual ones lost a frame."""
+_OFF, _STEADY = 0.3, 0.95
+"""Of a steady clock's frames, this share lies closer to it than `_OFF` periods."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,7 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
         raise InputError(source, f"{len(time)} frame(s); expected two or more")
     if (problem := order_problem(time)) is not None:
         raise InputError(source, f"frame {problem.row + 1}: {problem.text}")
+    frames, rate = _frames(source, time)
     markers = {name: _y_up(p) if capture.up == "z" else p for name, p in capture.markers.items()}
     bodies = {name: BodyTrack(p, q) for name, (p, q) in capture.bodies.items()}
     if capture.up == "z":
@@ -58,9 +65,28 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
         if bodies:
             problems.append(f"rigid bodies are formed of markers with a common name: {', '.join(bodies)}; each is taken to be "
                             "upright, without a rotation, in the first frame that shows all its markers")
-    return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=np.arange(len(time)),
-                     rate=rate_of(time), units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems),
-                     sensing="mocap")
+    return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=frames, rate=rate,
+                     units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems), sensing="mocap")
+
+
+def _frames(source: str, time: Array) -> tuple[NDArray[np.int64], float]:
+    """Numbers (N,) and rate [Hz] of frames at `time` (N,) [s], of which some may have been lost; InputError where no steady rate
+    explains the times, as cameras have one."""
+    rate, steps = rate_of(time), np.diff(time)
+    if np.isfinite(rate) and steps.max() < _LOST * np.median(steps):
+        return np.arange(len(time)), rate
+    period = float(np.median(steps[steps < _LOST * np.percentile(steps, 10)]))
+    for _ in range(3):
+        frames = np.concatenate([[0], np.cumsum(np.maximum(np.round(steps / period), 1))])
+        period, begin = np.polyfit(frames, time, 1)
+    off = np.abs(time - begin - frames * period)
+    if np.mean(off < _OFF * period) > _STEADY:
+        return frames.astype(np.int64), float(1 / period)
+    if np.isfinite(rate):
+        return np.arange(len(time)), rate
+    raise InputError(source, f"frames are {1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms apart, and no steady rate with "
+                             "lost frames explains their times; expected the camera's own times, or poses interpolated to a "
+                             "steady rate")
 
 
 def _doubts(capture: Capture) -> list[str]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.tables import is_binary, split_row
@@ -18,6 +19,7 @@ from workbench.recording.formats.log_commands import commands_of_rows, out_of_or
 from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
 _TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.IGNORECASE)
 _SECONDS = re.compile(r"(?:.*[./])?(?:stamp|time)[./]secs?", re.IGNORECASE)
@@ -95,11 +97,29 @@ def read_ros_csv(path: Path) -> Recording:
         raise InputError(source, f"column '{cells[time_at]}': expected increasing times in two rows or more")
     time = (time - time[0]) * scale
     joints = tuple(_name(table, names, k) for k in keys)
+    if len(set(joints)) < len(joints):
+        raise InputError(source, f"two columns of names say '{max(joints, key=joints.count)}'; expected each joint once")
+    if all(k in names for k in keys):
+        told = np.array([strings(table, names[k]) for k in keys], dtype=str).T[whole]
+        goals, positions = _by_name(source, joints, told, goals, positions)
     channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}
     channels |= {f"position.{j}": positions[:, i] for i, j in enumerate(joints)}
     return Recording(source=source, kind="ros_csv", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
                      units="radians", channels=channels,
                      commands=commands_of_rows(time, joints, goals, np.ones(goals.shape, dtype=bool)))
+
+
+def _by_name(source: str, joints: tuple[str, ...], told: NDArray[np.str_], goals: Array, positions: Array) -> tuple[Array, Array]:
+    """Goals and positions (N, n) in the order of `joints`; `told` (N, n): the names in each row's own order, blank where that is
+    the usual one."""
+    for row in np.flatnonzero((told != np.array(joints)).any(axis=1) & (told != "").all(axis=1)):
+        said = [name.strip() for name in told[row]]
+        if sorted(said) != sorted(joints):
+            raise InputError(source, f"row {row + 1} names {', '.join(said[:6])}; expected {', '.join(joints[:6])} as in the "
+                                     "first")
+        order = [said.index(j) for j in joints]
+        goals[row], positions[row] = goals[row, order], positions[row, order]
+    return goals, positions
 
 
 def _name(table: pa.Table, names: dict[str, int], key: str) -> str:

@@ -77,7 +77,8 @@ def check_assets(recording: Recording, model: RobotModel) -> None:
         link = model.rigid_bodies.get(asset)
         if link is None:
             known = ", ".join(model.rigid_bodies) or "none"
-            raise InputError(recording.source, f"asset '{asset}': no link is given for it in rigid_bodies; known assets: {known}")
+            raise InputError(recording.source, f"asset '{asset}': no link is given for it in rigid_bodies (give it, or "
+                                               f"export the take without the asset); known assets: {known}")
         if link not in links:
             raise InputError(model.description, f"rigid_bodies: asset '{asset}' is link '{link}', which the model lacks")
 

@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.robot.model_source.meshes import READ, drake_mesh, find_mesh
+from workbench.robot.model_source.standing import stand_on_world, without_mimics
 from workbench.robot.model_source.structure import check_structure
 from workbench.robot.model_source.urdf import sdf_of_urdf
 from workbench.robot.model_source.xml_file import check_includes, check_numbers, read_xml
@@ -68,9 +69,12 @@ def _prepare(source: Path, digest: str, packages: tuple[tuple[str, str], ...]) -
         notes.append("URDF, written as SDF")
     else:
         check_includes(source, root)
-    problems += check_structure(source, root)
+    stands, alone = stand_on_world(root), without_mimics(root)
+    notes += stands
+    problems += [*alone, *check_structure(source, root)]
+    changed |= bool(stands or alone)
     cache = cache_folder() / "models"
-    made, moved = _with_meshes(root, source, dict(packages), cache)
+    made, moved = _with_meshes(root, source, dict(packages), cache, moved=source.suffix.lower() != ".sdf")
     notes += [f"{n} {kind} mesh(es) made OBJ for Drake" for kind, n in made.items()]
     if not (changed or made or moved):
         return ModelSource(source, source, tuple(problems), tuple(notes))
@@ -81,11 +85,11 @@ def _prepare(source: Path, digest: str, packages: tuple[tuple[str, str], ...]) -
     return ModelSource(source, cache / name, tuple(problems), tuple(notes))
 
 
-def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache: Path) -> tuple[Counter[str], bool]:
+def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache: Path,
+                 moved: bool) -> tuple[Counter[str], bool]:
     """Sets each mesh's URI to a file that is there and that Drake reads; how many were converted, by kind, and whether any URI is
-    not as it was."""
+    not as it was. moved: the description is written to another folder anyway, as Drake takes its kind from its file's name."""
     made: Counter[str] = Counter()
-    moved = False
     for link in root.iter("link"):
         place = f"link '{link.get('name', '')}'"
         for uri in link.iter("uri"):

@@ -12,6 +12,8 @@ from workbench.files import InputError
 
 _RADIANS = 4 * math.pi
 """Limits beyond are degrees."""
+_TURN = 2 * math.pi + 0.01
+"""The same of a pose's angles."""
 
 
 def check_structure(path: Path, sdf: Element) -> list[str]:
@@ -25,6 +27,8 @@ def check_structure(path: Path, sdf: Element) -> list[str]:
             problems += _inertia_problems(path, link, hangs.get(link.get("name") or "") != "fixed")
         for joint in model.findall("joint"):
             problems += _limit_problems(path, joint)
+        for part in (*model.findall("link"), *model.findall("joint")):
+            problems += _pose_problems(part)
     return problems
 
 
@@ -53,6 +57,8 @@ def _inertia_problems(path: Path, link: Element, moved: bool) -> list[str]:
     inertial = link.find("inertial")
     if inertial is None:
         return [f"{name} has no <inertial>: SDF then gives it 1 kg and 1 kg m^2"] if moved or len(link) else []
+    if inertial.get("auto") in ("true", "1"):
+        raise InputError(path, f"{name}: <inertial auto>: expected <mass> and <inertia> in numbers, which effects on them change")
     mass = float(inertial.findtext("mass") or "1")
     if mass < 0:
         raise InputError(path, f"{name}: mass {mass:g} kg; expected 0 or more")
@@ -69,6 +75,16 @@ def _inertia_problems(path: Path, link: Element, moved: bool) -> list[str]:
         listed = ", ".join(f"{p:.3g}" for p in principal)
         return [f"{name}: no body has principal moments of inertia of {listed} kg m^2 (each is at most the sum of the others); "
                 f"Drake takes a ball of water of {mass:g} kg about its centre of mass instead"]
+    return []
+
+
+def _pose_problems(part: Element) -> list[str]:
+    """Of a link, its shapes, or a joint: angles of more than a turn."""
+    for pose in part.iter("pose"):
+        words = (pose.text or "").split()
+        if len(words) == 6 and pose.get("degrees") not in ("true", "1") and max(abs(float(w)) for w in words[3:]) > _TURN:
+            return [f"{part.tag} '{part.get('name', '')}': a pose of {' '.join(words[3:])} rad (roll, pitch, yaw) is more than a "
+                    "turn: are the angles in degrees?"]
     return []
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from workbench.files import InputError
+from workbench.robot.model_source.standing import mimics
 from workbench.robot.model_source.xml_file import DRAKE
 
 _TYPES = {"revolute": "revolute", "continuous": "revolute", "fixed": "fixed", "prismatic": "prismatic"}
@@ -168,7 +169,7 @@ def _joint(model: Element, joint: Element, names: dict[str, str], path: Path) ->
         for key in ("damping", "friction"):
             _value(values, key, dynamics.get(key))
     mimic = joint.find("mimic")
-    return [] if mimic is None else [f"joint '{name}' mimics '{mimic.get('joint')}'; here it is a joint of its own, with a servo"]
+    return [] if mimic is None else [mimics(name, mimic.get("joint"))]
 
 
 def _filter_group(model: Element, group: Element, names: dict[str, str]) -> None:
