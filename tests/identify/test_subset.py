@@ -17,6 +17,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather, prepare
 from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.servo_logs import most_together
 from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
 from workbench.robot import EffectSpec
 from workbench.simulation import SimulationConfig
@@ -188,6 +189,11 @@ def test_of_a_logs_nominal_rollout_only_the_rows_of_the_log_are_kept(tmp_path):
     (kept,), (e,) = seen.nominal.values(), seen.evidence
     (whole,) = roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1, floors=False)
     assert len(kept) == len(e.take.recorded) < len(whole.nominal)
+    asked = [(RolloutRequest(model, (0,), step), (0,)) for step in (1.0, 0.5)]
+    assert most_together([e], CONFIG, asked) == PROBLEM.together
+    fine = most_together([e], replace(CONFIG, time_step=2e-6, log_period=2e-6), asked)  # 3 joints, half a million rows
+    assert 1 <= fine < PROBLEM.together
+    assert fine * 8 * 3 * 1.0 / 2e-6 <= PROBLEM.played << 20
     shown, usual = e.take.observe(kept), e.take.observe(whole.nominal)
     np.testing.assert_array_equal(shown.time, usual.time)
     np.testing.assert_array_equal(shown.q, usual.q)

@@ -44,6 +44,8 @@ class ProblemOptions:
     together: int = 64
     """Requests for servo logs that a thread plays at once: of several structures, each with enough robots for full lanes. What
     was played is kept only after all of them."""
+    played: int = 96
+    """Angles of servo logs that are played at once [MiB]: 64 rollouts of 200 s of three joints at 1 ms are 290."""
     loaded: float = 1.0
     """Torque of gravity, in dry frictions, from which on a joint is loaded: friction holds against less, so that nothing moves in
     its gear."""

@@ -20,7 +20,7 @@ from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollouts.captured import Rollout, channels_stream
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
-from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
+from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles, most_together
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
@@ -123,7 +123,7 @@ class RolloutEvaluator:
     def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
         """Angles of logs, by question, a block of them as soon as those before it are there."""
         wanted, rolled = [(q, tuple(takes)) for q, takes in asked], partial(log_angles, self.evidence, self.config)
-        size = max(1, min(PROBLEM.together, -(-len(wanted) // self.n_jobs)))
+        size = max(1, min(most_together(self.evidence, self.config, wanted), -(-len(wanted) // self.n_jobs)))
         blocks = (wanted[k:k + size] for k in range(0, len(wanted), size))
         if self.n_jobs == 1 or len(wanted) < 2:
             yield from chain.from_iterable(map(rolled, blocks))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from workbench.identify.options import PROBLEM
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
@@ -36,6 +37,18 @@ def is_log(e: TakeEvidence) -> bool:
 def frames(e: TakeEvidence) -> Mask:
     """Frames of a log that are looked at."""
     return np.asarray((e.since >= 0) & (e.since <= e.until))
+
+
+def most_together(evidence: Sequence[TakeEvidence], config: SimulationConfig,
+                  questions: Sequence[tuple[RolloutRequest, Sequence[int]]]) -> int:
+    """How many requests are played at once: `PROBLEM.together`, or fewer where rollouts are so long and finely logged that their
+    angles would take more than `PROBLEM.played` MiB."""
+    largest = 1.0
+    for q, takes in questions:
+        every = replace(config, time_step=q.step * config.time_step).logged_every
+        seconds = sum(min(evidence[i].until, float(evidence[i].since[-1])) for i in takes)
+        largest = max(largest, 8 * len(q.model.joints) * seconds / every)
+    return max(1, min(PROBLEM.together, int((PROBLEM.played << 20) / largest)))
 
 
 @lru_cache(maxsize=16)
