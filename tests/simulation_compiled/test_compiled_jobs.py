@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from workbench.motion.commands import Commands
 from workbench.motion.files import load_motion
 from workbench.robot import EffectSpec, Ground, RobotModel, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, Start, simulate_batch
-from workbench.simulation.batch import run_job
+from workbench.simulation.batch import run_job, simulate_stream
 from workbench.simulation.compiled import covers
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.compiled.kernel import is_compiled
@@ -162,6 +163,19 @@ def test_a_batch_mixes_engines_and_keeps_its_order(robot):
     short = [replace(walk_job(robot, "fixed"), duration=0.02 * (1 + i), name=str(i), times=times) for i in range(4)]
     jobs = [replace(j, config=replace(j.config, engine="drake")) if i % 2 else j for i, j in enumerate(short)]
     assert [t.name for t in simulate_batch(jobs, 2)] == ["0", "1", "2", "3"]
+
+
+def test_takes_that_nobody_waits_for_are_dropped_without_a_word(robot, monkeypatch):
+    """As after an error in an earlier one."""
+    lost = []
+    monkeypatch.setattr("sys.unraisablehook", lost.append)
+    short = replace(walk_job(robot, "fixed"), duration=0.02, times=np.array([0.0, 0.01]))
+    jobs = [replace(short, config=replace(short.config, engine="drake"), name=str(i)) for i in range(6)]
+    stream = iter(simulate_stream(jobs, 2))
+    assert next(stream).name == "0"
+    del stream
+    gc.collect()
+    assert not lost
 
 
 def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robot):

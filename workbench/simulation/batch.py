@@ -62,9 +62,17 @@ def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
         return
     from joblib import Parallel, delayed
 
-    with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
-        warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
-        yield from Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
+    takes = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
+    try:
+        for _ in jobs:
+            with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
+                warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
+                take = next(takes)
+            yield take
+    finally:
+        with warnings.catch_warnings():  # whoever stops early does not want the rest
+            warnings.simplefilter("ignore")
+            takes.close()
 
 
 _stations: OrderedDict[Any, Simulation] = OrderedDict()
