@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
@@ -32,6 +31,7 @@ from workbench.gait.straighten import PROBED, Straightener, summary_of_straighte
 from workbench.gait.table import GaitTable
 from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel
+from workbench.simulation.cluster import stream_results
 from workbench.types import Progress
 
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "certify"]
@@ -128,12 +128,10 @@ def _run(work: Mapping[str, Sequence[Work]], n_jobs: int, progress: Progress) ->
     """Runs groups of simulations in `n_jobs` processes; returns each group's results, in its order."""
     queue = [(group, *item) for group, items in work.items() for item in items]
     out: dict[str, list[Any]] = {group: [] for group in work}
-    with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
-        warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
-        results = iter(Parallel(n_jobs=n_jobs, return_as="generator", batch_size=1)(delayed(f)(*args) for *_, f, args in queue))
-        for k, (group, what, *_) in enumerate(queue):
-            progress(f"certifying: {what}", k / len(queue))
-            out[group].append(next(results))
+    results = stream_results((delayed(f)(*args) for *_, f, args in queue), n_jobs, batch_size=1)
+    for k, (group, what, *_) in enumerate(queue):
+        progress(f"certifying: {what}", k / len(queue))
+        out[group].append(next(results))
     return out
 
 

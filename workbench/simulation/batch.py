@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +11,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.recording.take import Take
-from workbench.simulation.cluster import on_cluster
+from workbench.simulation.cluster import on_cluster, stream_results
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Simulation
 
@@ -47,7 +46,7 @@ def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
 
 def _in_threads_and_processes(jobs: Sequence[Job], n_jobs: int) -> Iterator[Take]:
     here = [_is_compiled(job) for job in jobs]
-    elsewhere = iter(_in_processes([_by_drake(job) for job, c in zip(jobs, here) if not c], n_jobs))
+    elsewhere = _in_processes([_by_drake(job) for job, c in zip(jobs, here) if not c], n_jobs)
     with ThreadPoolExecutor(n_jobs) as threads:
         started = [threads.submit(run_job, job) if c else None for job, c in zip(jobs, here)]
         try:
@@ -57,22 +56,12 @@ def _in_threads_and_processes(jobs: Sequence[Job], n_jobs: int) -> Iterator[Take
             threads.shutdown(cancel_futures=True)
 
 
-def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
+def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterator[Take]:
     if not jobs:
         return
-    from joblib import Parallel, delayed
+    from joblib import delayed
 
-    takes = Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
-    try:
-        for _ in jobs:
-            with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
-                warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
-                take = next(takes)
-            yield take
-    finally:
-        with warnings.catch_warnings():  # whoever stops early does not want the rest
-            warnings.simplefilter("ignore")
-            takes.close()
+    yield from stream_results((delayed(run_job)(job) for job in jobs), n_jobs)
 
 
 _stations: OrderedDict[Any, Simulation] = OrderedDict()
