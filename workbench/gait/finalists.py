@@ -29,7 +29,7 @@ class Screening:
     gait that breaks a limit in one meets no more, where a few robots may break one by chance. certified: how many gaits may be
     certified at most, which takes as long as a small search. Fresh robots are neither the search's nor the certificate's."""
 
-    rounds: tuple[int, ...] = (8, 24, 64)
+    rounds: tuple[int, ...] = (8, 24)
     certified: int = 3
 
 
