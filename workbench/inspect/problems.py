@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from filecmp import cmp
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -110,8 +110,8 @@ def session_check(session: Session) -> SessionCheck:
 
 
 def recorded_twice(session: Session) -> dict[str, str]:
-    """Takes whose recordings are the same, byte by byte, as those of earlier ones, with the first of these."""
-    first: dict[bytes, str] = {}
+    """Takes whose recording is a copy of an earlier take's, byte for byte, with that take."""
+    earlier: list[tuple[Path, str, str]] = []
     out = {}
     for take in session.takes:
         file, part = take.recording, ""
@@ -120,9 +120,10 @@ def recorded_twice(session: Session) -> dict[str, str]:
             file = Path(whole)
         if not file.is_file():
             continue
-        said = hashlib.sha256(file.read_bytes()).digest() + part.encode()
-        if first.setdefault(said, take.name) != take.name:
-            out[take.name] = f"take '{first[said]}'"
+        twin = next((name for other, its_part, name in earlier if its_part == part and cmp(other, file, shallow=False)), None)
+        if twin is not None:
+            out[take.name] = f"take '{twin}'"
+        earlier.append((file, part, take.name))
     return out
 
 
