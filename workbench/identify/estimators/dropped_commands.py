@@ -136,9 +136,9 @@ def least_explained(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> f
 
 
 def stands_at_an_end(evidence: Sequence[TakeEvidence], joint: str, lost: Mapping[int, Sequence[int]]) -> bool:
-    """Whether each pose that seems missed, by take, asks for more than the joint ever went, and the joint stands there: it may be
-    stopped."""
-    ends: dict[float, float] = {}  # by direction, as far as the joint went
+    """Whether every pose that seems missed demands an angle beyond all that the joint reached, while the joint stands at the end
+    of that range, as it does at a mechanical stop. lost: poses by take."""
+    ends: dict[float, float] = {}  # furthest angle reached, by direction
     for i, poses in lost.items():
         commands = evidence[i].take.commands
         assert commands is not None
@@ -161,7 +161,7 @@ def _observed_angle(e: TakeEvidence, joint: str) -> Array:
 
 
 def _at_the_end(e: TakeEvidence) -> Sequence[slice]:
-    """By command, the last frames before the next one comes; after the last, all from then on."""
+    """For each command, the last frames before the next one comes; for the last command, all later frames."""
     time, ends = e.since, ends_of(e)
     first, after = (np.searchsorted(time, t, side="right") for t in (ends - 0.06, ends))
     after[-1:] = len(time)
@@ -195,7 +195,7 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
 
 
 def _middle(angle: Array, frames: slice, good: NDArray[np.bool_], since: float) -> float:
-    """The median way of a joint in the good ones of some frames [rad], from where it was."""
+    """Median displacement of a joint from `since` [rad] over the good frames."""
     return float(np.median(angle[frames][good]) - since)
 
 

@@ -35,10 +35,10 @@ def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], S
 
 
 def ends_of(e: TakeEvidence) -> Array:
-    """By command, when the next one comes [s]."""
+    """For each command, the time when the next one comes [s]; for the last, the end."""
     commands = e.take.commands
     assert commands is not None
-    return np.append(commands.times[1:], [commands.end] * bool(len(commands.times)))
+    return np.append(commands.times, commands.end)[1:]
 
 
 def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]) -> DroppedPoses:
@@ -52,7 +52,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
             break
         both = {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}
         after = _residuals_without(evaluator, nominal, both, residuals)
-        guilty = {(i, j): explained(evaluator.evidence[i], j, poses, now[i], after[i]) for (i, j), poses in new.items()}
+        guilty = {(i, j): _explaining(evaluator.evidence[i], j, poses, now[i], after[i]) for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
         found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
         if not found:
@@ -82,7 +82,8 @@ def suspects(
             moves = steps(e, joint, gone)
             behind = _lagging(e, joint, {k: way for k, way in moves.items() if (i, joint, k) not in cleared}, now[i])
             if behind and len(behind) + len(gone) <= READ_OFF.most_dropped_in_motion * (len(moves) + len(gone)):
-                out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
+                following = {k + 1 for k in behind}
+                out[i, joint] = tuple(k for k in behind if k not in following)
     return out
 
 
@@ -95,23 +96,23 @@ def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     return {k: float(ways[k]) for k in np.flatnonzero(np.abs(ways) >= READ_OFF.least_step).tolist() if k not in missed}
 
 
-def _lagging(e: TakeEvidence, joint: str, moves: Mapping[int, float], residual: Array) -> dict[int, None]:
-    """Of the poses that move a joint, in their order, those before which it was well, and after which it stays behind until the
-    next comes."""
+def _lagging(e: TakeEvidence, joint: str, moves: Mapping[int, float], residual: Array) -> list[int]:
+    """The poses, in order, before which the joint followed and after which it lags until the next pose. moves: changes of the
+    joint's goal [rad] by pose."""
     error = residual[:, e.channels.index(joint)]
     before, came, until = _frames(e)
-    out: dict[int, None] = {}
+    out = []
     for k, way in moves.items():
         was, then = (-np.sign(way) * error[a:b] for a, b in ((before[k], came[k]), (came[k], until[k])))
         was, then = was[np.isfinite(was)], then[np.isfinite(then)]
         if len(then) and np.all(np.abs(was) < READ_OFF.calm) and then.max() > max(READ_OFF.behind, -then.min()):
-            out[k] = None
+            out.append(k)
     return out
 
 
-def explained(e: TakeEvidence, joint: str, poses: Sequence[int], before: Array, after: Array) -> tuple[int, ...]:
-    """Of these poses, those without which a joint goes as recorded until the next came. before, after: residuals of the take with
-    and without all of them."""
+def _explaining(e: TakeEvidence, joint: str, poses: Sequence[int], before: Array, after: Array) -> tuple[int, ...]:
+    """The poses without which the joint moves as recorded until the next pose. before, after: residuals of the take with and
+    without all of these poses."""
     channel = e.channels.index(joint)
     _, came, until = _frames(e)
     out = []
@@ -125,8 +126,8 @@ def explained(e: TakeEvidence, joint: str, poses: Sequence[int], before: Array, 
 
 
 def _frames(e: TakeEvidence) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.int_]]:
-    """By command, three frames: from the first on a joint shows how it went before, from the second on what the command does,
-    alone until the third."""
+    """Indices of three frames for each command: the first that shows the joint before the command, the first that shows its
+    effect, and the first that may show the effect of the next one."""
     commands, time = e.take.commands, e.since
     assert commands is not None
     instants = (commands.times - READ_OFF.before, commands.times, ends_of(e) + READ_OFF.lag)
