@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import gammaln
 from scipy.stats import t as student_t
 
+from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
@@ -33,6 +34,11 @@ Label = tuple[str, tuple[str, ...], str, int]
 """Which number: an effect's name, where it acts, the parameter and its component; of the nominal law "" and the joint."""
 
 
+def zero_effect() -> Effect:
+    """The effect that turns a joint's zero."""
+    return estimated_by("turn about an axis")[0]
+
+
 @dataclass(frozen=True)
 class Uncertain:
     """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
@@ -52,7 +58,7 @@ class Uncertain:
     @property
     def effect(self) -> str:
         """Name of the effect that adds to the same constant, if there is one."""
-        return estimated_by("turn about an axis")[0].name if self.name == ZERO else self.name
+        return zero_effect().name if self.name == ZERO else self.name
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"

@@ -9,8 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from workbench.effects.registry import estimated_by
-from workbench.identify.evidence.hypothesis import ZERO, Uncertain
+from workbench.identify.evidence.hypothesis import ZERO, Uncertain, zero_effect
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance
@@ -93,7 +92,7 @@ def mixing(numbers: Sequence[Uncertain]) -> Array:
 
 def turned_horn(joint: str, angle: float) -> EffectSpec:
     """The effect that turns a joint's zero by `angle` [rad]."""
-    effect, *_ = estimated_by("turn about an axis")
+    effect = zero_effect()
     (p,) = effect.parameters
     return EffectSpec(effect.name, (joint,), {p.name: angle / p.si})
 
