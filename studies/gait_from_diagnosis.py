@@ -22,7 +22,7 @@ from studies import sealed_predictions
 from studies.common import kept_result, publish, run_study
 from studies.concealed_effects.sealed import Vault
 from studies.other_engine.as_take import mujoco_take
-from studies.sealed_predictions import CYCLES, Played, diagnosed_model, hidden_robot, predicted, went
+from studies.sealed_predictions import CYCLES, DIAGNOSES, Played, hidden_robot, predicted, went
 from workbench.compare.session import load_session
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.ensemble import load_ensemble
@@ -30,7 +30,8 @@ from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, search
-from workbench.robot import RobotModel
+from workbench.identify.results.findings import MODEL
+from workbench.robot import RobotModel, load_model
 from workbench.view.report.page import Provenance, Report, Section, Table
 
 BUDGET = Budget(seeds=60, screened=6, starts=1, generations=10, draws=4)
@@ -53,7 +54,7 @@ def one(vault: Vault, name: str, out: Path, budget: Budget, tell: Callable[[str]
     """Both gaits of one robot, as predicted and as the robot walks."""
     session = load_session(out / "sessions" / name / "session.yaml")
     real, row = hidden_robot(vault, name, session.model), dict[str, Any]()
-    for who, model in (("diagnosed", diagnosed_model(out, name, session, tell)), ("nominal", session.model)):
+    for who, model in (("diagnosed", load_model(out / DIAGNOSES / name / MODEL)), ("nominal", session.model)):
         gait = fastest(model, budget, int(name[-2:]), lambda what, who=who: tell(f"{name}: {who} model: {what}"))  # type: ignore[misc]
         table = gait.table
         played = Played(table.commands(CYCLES), table.start_seconds, table.period)

@@ -32,7 +32,7 @@ from studies.concealed_effects.takes import filmed_takes
 from studies.other_engine.as_take import mujoco_take
 from studies.other_engine.make_session import random_camera, write_recordings
 from studies.other_engine.player import Rollout
-from workbench.compare.session import Session, load_session
+from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.gait.certificate import PUPPY_CLAIM
@@ -41,16 +41,17 @@ from workbench.gait.measure import measure
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
 from workbench.identify.diagnosis import diagnose_session
-from workbench.identify.results.findings import MODEL
 from workbench.motion import Commands
 from workbench.recording.take import Take
-from workbench.robot import EffectSpec, RobotModel, load_model
+from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.report.page import Provenance, Report, Section, Table, Text
 
 ROBOTS, CYCLES, TRIES = 20, 10, 20
 SLOWEST = 0.02
 """Speed [m/s] below which an error is counted by this and not by the speed itself."""
+DIAGNOSES = "diagnoses"
+"""Folder of the diagnosed models, one folder for each robot."""
 TROT = GaitShape("trot", (1, 1), 8, 2.0, stride=0.04, duty=0.6, lift=0.02, crouch=0.045, lead=1.0)
 MOTIONS: Mapping[str, GaitShape] = {
     "trot": TROT, "slow": replace(TROT, stride=0.02), "fast": replace(TROT, stride=0.06), "quick": replace(TROT, frequency=2.6),
@@ -137,15 +138,6 @@ def hidden_robot(vault: Vault, name: str, model: RobotModel) -> RobotModel:
     return replace(model, effects=tuple(specs))
 
 
-def diagnosed_model(out: Path, name: str, session: Session, tell: Callable[[str], None]) -> RobotModel:
-    """What a robot's session was diagnosed as, in a study's folder; diagnosed again where that was not kept."""
-    folder = out / "diagnoses" / name
-    if not (folder / MODEL).is_file():
-        tell(f"{name}: diagnosing")
-        diagnose_session(session, n_jobs=1).diagnosis.save(folder)
-    return load_model(folder / MODEL)
-
-
 def errors(said: Mapping[str, Went], true: Mapping[str, Went]) -> dict[str, float]:
     """Median relative error of speed, median error of turning [deg/s], and rank correlation of the speeds, over the gaits in
     which the robot did not fall; NaN where there are too few."""
@@ -166,7 +158,7 @@ def one(vault: Vault, k: int, out: Path, count: int, tell: Callable[[str], None]
     model = robot(vault, k, folder)
     tell(f"{name}: diagnosing")
     diagnosis = diagnose_session(load_session(folder / "session.yaml"), n_jobs=1).diagnosis
-    diagnosis.save(out / "diagnoses" / name)
+    diagnosis.save(out / DIAGNOSES / name)
     tell(f"{name}: predicting")
     motions = gaits(model, count)
     said = {who: predicted(m, motions) for who, m in (("diagnosed", diagnosis.model), ("nominal", diagnosis.nominal))}
