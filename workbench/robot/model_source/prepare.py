@@ -16,8 +16,8 @@ from xml.etree.ElementTree import Element
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.robot.model_source.meshes import READ, drake_mesh, find_mesh
-from workbench.robot.model_source.standing import stand_on_world, without_mimics
 from workbench.robot.model_source.structure import check_structure
+from workbench.robot.model_source.unsupported_joints import stand_on_world, without_mimics
 from workbench.robot.model_source.urdf import sdf_of_urdf
 from workbench.robot.model_source.xml_file import check_includes, check_numbers, read_xml
 

@@ -1,4 +1,4 @@
-"""Parts of an SDF that Drake reads and the workbench's robots do not have, written in another way."""
+"""Joints of an SDF that Drake supports and the workbench does not, rewritten: joints on the world, and coupled joints."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from xml.etree.ElementTree import Element, SubElement
 
 
 def stand_on_world(sdf: Element) -> list[str]:
-    """Puts a link without mass, fixed to the world, under each joint that moves a link against the world itself, as a rig's
-    pendulum has: a robot's root is a link. A line for each model so changed."""
+    """Inserts a massless link, fixed to the world, as the parent of each movable joint whose parent is the world, such as a test
+    rig's pendulum: the root of a robot is a link. Returns a line for each model changed."""
     said = []
     for model in sdf.iter("model"):
         on_world = [j for j in model.findall("joint") if (j.findtext("parent") or "").strip() == "world"]
@@ -33,7 +33,7 @@ def stand_on_world(sdf: Element) -> list[str]:
 
 
 def without_mimics(sdf: Element) -> list[str]:
-    """Takes away the couplings of joints to others, which servos do not have; a line for each."""
+    """Removes the couplings between joints, which servos do not have; returns a line for each."""
     said = []
     for joint in sdf.iter("joint"):
         for axis in (*joint.findall("axis"), *joint.findall("axis2")):

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from workbench.files import InputError
-from workbench.robot.model_source.standing import mimics
+from workbench.robot.model_source.unsupported_joints import mimics
 from workbench.robot.model_source.xml_file import DRAKE
 
 _TYPES = {"revolute": "revolute", "continuous": "revolute", "fixed": "fixed", "prismatic": "prismatic"}
