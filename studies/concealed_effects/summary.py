@@ -65,7 +65,7 @@ def bounds(k: int, n: int) -> tuple[float, float]:
 
 
 def reliability(scores: Sequence[Score]) -> list[Bin]:
-    """Bins of the confidences of all counted findings; empty ones are omitted."""
+    """Counted findings by bin of confidence, without empty bins."""
     pairs = [p for s in scores for p in s.calibration]
     out = []
     for low, high in itertools.pairwise(BINS):

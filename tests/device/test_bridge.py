@@ -46,7 +46,7 @@ def test_the_bus_through_the_flashed_image():
 @pytest.mark.slow
 @needs_compiler
 def test_silence_on_the_bridge_ends_with_torque_off():
-    """What a killed program, or a pulled plug, comes to."""
+    """A killed program or a pulled plug stops sending."""
     r, _, bus = bridged()
     bus.sync_write({i: {"goal_position": 540, "moving_speed": 100} for i in IDS})
     r.run(500)

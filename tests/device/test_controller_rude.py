@@ -23,7 +23,7 @@ BOUNDS = bounds_of(WALK, puppy_model())
 
 
 class Watched:
-    """A robot with the core in it, what the host sent, and goals that were out of neutral."""
+    """A robot that runs the core, with a record of the packets from the host and of the goals away from neutral."""
 
     def __init__(self) -> None:
         self.sim = Sim(walk())

@@ -1,4 +1,4 @@
-"""The nominal law as nuisance: how well its numbers are known, what they become, and what the servos' registers allow."""
+"""The nominal law as nuisance: uncertainty of its constants, their recalibration, and bounds from the servos' registers."""
 
 from dataclasses import replace
 
