@@ -19,7 +19,7 @@ class CompareOptions:
     noise makes of a foot's height (0.2 mm in the practice sessions). On simulated walks the duty factor then lies within 0.04
     above that from contact forces."""
     stance_load: float = 0.05
-    """A foot stands where it carries more than this share of the robot's mean load in the simulation: a quarter leg's worth is
+    """A foot stands where it carries more than this share of the robot's mean load in the simulation: a quarter of the load is
     five times as much."""
     first_move: float = radians(1.0)
     """A recording without commands starts where a joint has left its first angle by this [rad]: more than three counts of an
@@ -61,14 +61,14 @@ class FileLimits:
     fewest_frames: int = 20
     """Of a take."""
     longest_name: int = 100
-    """Of a take [bytes]: files are named after it, and file systems take 255 with what is put about it."""
+    """Longest name of a take [bytes]: output files are named after it, with prefix and suffix, and file systems allow 255."""
     moves_at_once: float = radians(30.0)
     """Speed of a joint in a capture's first frames [rad/s] at which the robot does not stand. Where the bundled synthetic walk is
     cut within its gait, a third of its joints or more are faster at 33 of 36 places; at rest none is."""
     first_frames: float = 0.03
-    """A joint has to be so fast through two stretches of this duration [s]."""
+    """Duration of each of the two consecutive stretches in which a joint has to exceed that speed [s]."""
     share_moving: float = 1 / 3
-    """Share of the joints seen that move so."""
+    """A capture is refused if at least this share of its visible joints moves so fast."""
 
 
 @dataclass(frozen=True)
