@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -35,7 +35,7 @@ Tie = Literal["gravity against torque", "less torque at full duty"]
 """Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so only the
 ratio of gravity to torque is known; and a limit, saturation or supply sag at high duty all reduce the torque in the same way."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
-                    "turn about an axis"]
+                    "turn about an axis", "gain in a register of duty"]
 """Ways to estimate an effect directly from the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
@@ -86,13 +86,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Registers:
-    """Readings of the servos' own registers in one log, NaN where there are none. duty, nominal_duty: by joint, (N,), duty of the
-    servo's H-bridge, and of the nominal law at the logged error, before it is limited to 1. voltage (N,) [V], None if it was not
-    logged."""
+    """Readings of the servos' own registers in one log, NaN where there are none. duty: by joint, (N,), of the servo's H-bridge;
+    voltage (N,) [V], None if it was not logged; gain: by joint, the servo's position gain over nominal as its duty shows it in
+    all logs, and its standard error."""
 
     duty: Mapping[str, Array]
-    nominal_duty: Mapping[str, Array]
     voltage: Array | None = None
+    gain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 class Effect:

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from workbench.effects.base import Parameter, Registers, mean_of_logs
+from workbench.effects.base import Parameter, Registers
 from workbench.effects.servo_constant import ServoConstant
 from workbench.robot import EffectSpec, RobotModel
-
-LEAST_DUTY, MOST_DUTY = 0.05, 0.9
-"""Range of duty in which the gain can be measured: below it, counts of position are too coarse; above it, duty may saturate."""
-COUNTS = 0.01
-"""Least standard error of a duty register, which is read some milliseconds before or after the position."""
 
 
 class ServoGain(ServoConstant):
@@ -23,6 +16,7 @@ class ServoGain(ServoConstant):
     field = "gain"
     how = "multiply"
     family = "electrical"
+    estimator = "gain in a register of duty"
     # gain registers have steps of powers of two, like the AX-12A's compliance slope: one step
     parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8, seldom_beyond=2.0),)
 
@@ -33,17 +27,8 @@ class ServoGain(ServoConstant):
         return (1.0,)
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Ratio of the duty register to the duty of the nominal law at the logged error."""
-        ratios = []
-        for log in logs:
-            for joint in where:
-                if joint not in log.duty or joint not in log.nominal_duty:
-                    continue
-                duty, nominal = log.duty[joint], log.nominal_duty[joint]
-                good = np.isfinite(duty) & np.isfinite(nominal) & (np.abs(nominal) > LEAST_DUTY) & (np.abs(nominal) < MOST_DUTY)
-                if good.sum() > 50:
-                    ratios.append(float(duty[good] @ nominal[good] / (nominal[good] @ nominal[good])))
-        return mean_of_logs(ratios, COUNTS)
+        """The gain that the register of duty shows, as the servo's law read from all logs has it."""
+        return next((log.gain[joint] for log in logs for joint in where if joint in log.gain), None)
 
 
 EFFECT = ServoGain()

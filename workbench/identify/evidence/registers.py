@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.compare.logged import register_laws
 from workbench.compare.session_takes import ReadTake
 from workbench.effects.base import Registers
 from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Rejected
 from workbench.identify.results.reasons import RefutedByRegister
@@ -17,20 +19,15 @@ from workbench.identify.results.reasons import RefutedByRegister
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
     """The servos' registers, log by log."""
+    gains = {joint: (law.gain, max(law.sd["gain"], READ_OFF.duty_law * law.gain)) for joint, law in register_laws(takes).items()}
     out = []
     for t in takes:
-        channels, duty, nominal = t.recording.channels, {}, {}
+        channels, duty = t.recording.channels, {}
         for joint in t.model.joints:
-            if (register := channels.get(f"duty.{joint}")) is None:
-                continue
-            on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
-            duty[joint] = np.where(on, register, np.nan)
-            goal, position = (channels.get(f"{name}.{joint}") for name in ("goal", "position"))
-            if goal is not None and position is not None:
-                servo, error = t.model.servo(joint), goal - position
-                beyond = np.maximum(np.abs(error) - servo.margin, 0.0)
-                nominal[joint] = np.where(on, np.copysign(servo.punch_duty * (beyond > 0) + servo.gain * beyond, error), np.nan)
-        out.append(Registers(duty, nominal, channels.get("voltage")))
+            if (register := channels.get(f"duty.{joint}")) is not None:
+                on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
+                duty[joint] = np.where(on, register, np.nan)
+        out.append(Registers(duty, channels.get("voltage"), gains))
     return out
 
 
