@@ -143,7 +143,7 @@ class EvidenceOptions:
     motion: RangeOptions = field(default_factory=RangeOptions)
     faster: float = 1.5
     changed: float = 0.5
-    formal: float = 8.0
+    formal: float = 3.0
     law: LawOptions = field(default_factory=LawOptions)
     sure: float = 3.0
     refuted: float = 0.3
