@@ -86,7 +86,7 @@ def registers(drop: float, seed: int) -> Registers:
     rng = np.random.default_rng(seed)
     duty = np.clip(rng.uniform(-1.5, 1.5, 400), -1.0, 1.0)
     voltage = np.round(7.4 - drop * np.abs(duty) + rng.normal(size=400) * 0.03, 1)
-    return Registers({"j": duty}, voltage, {"j": (0.7, 0.02)})
+    return Registers({"j": duty}, voltage)
 
 
 @pytest.mark.parametrize("drop", [0.0, 1.2])
@@ -96,14 +96,9 @@ def test_the_register_of_voltage_tells_a_sag(drop):
     assert error < 0.1
 
 
-def test_a_gain_is_that_of_the_registers_law():
-    assert effect_named("servo_gain").in_registers([registers(0.0, k) for k in range(4)], ("j",)) == (0.7, 0.02)
-
-
 def test_registers_that_are_not_there_say_nothing():
-    bare = [replace(registers(0.0, k), voltage=None, duty={}, gain={}) for k in range(4)]
+    bare = [replace(registers(0.0, k), voltage=None, duty={}) for k in range(4)]
     assert effect_named("supply_sag").in_registers(bare, ()) is None
-    assert effect_named("servo_gain").in_registers(bare, ("j",)) is None
 
 
 def test_a_supply_that_would_burn_the_servo_is_refuted(tmp_path):

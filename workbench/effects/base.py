@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -25,6 +25,8 @@ from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
+    from workbench.recording.servo_log.duty_register import RegisterLaw
+    from workbench.robot import ServoConstants
 
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
@@ -35,7 +37,7 @@ Tie = Literal["gravity against torque", "less torque at full duty"]
 """Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so only the
 ratio of gravity to torque is known; and a limit, saturation or supply sag at high duty all reduce the torque in the same way."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
-                    "turn about an axis", "gain in a register of duty"]
+                    "turn about an axis"]
 """Ways to estimate an effect directly from the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
@@ -86,13 +88,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Registers:
-    """Readings of the servos' own registers in one log, NaN where there are none. duty: by joint, (N,), of the servo's H-bridge;
-    voltage (N,) [V], None if it was not logged; gain: by joint, the servo's position gain over nominal as its duty shows it in
-    all logs, and its standard error."""
+    """Readings of the servos' registers in one log, NaN where there are none. duty: by joint, (N,); voltage (N,) [V], or None."""
 
     duty: Mapping[str, Array]
     voltage: Array | None = None
-    gain: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 class Effect:
@@ -229,8 +228,11 @@ class Effect:
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the unit of docs/formats.md, estimated from the servos' own registers, and its standard error;
-        None if they do not determine it."""
+        """Its first parameter, in the unit of docs/formats.md, as the servos' registers show it, and its standard error, or None."""
+        return None
+
+    def in_duty(self, law: RegisterLaw, servo: ServoConstants) -> tuple[float, float] | None:
+        """The same, from the law behind the duty in one joint's logs; the error includes what is unknown of the nominal servo."""
         return None
 
 

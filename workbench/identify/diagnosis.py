@@ -160,7 +160,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     after, floors = found.left_by(evaluator, progress)
     progress("judging the engine", None)
     apart[BESIDE_DRAKE.format("final")] = judge_by_drake(evaluator, fitted, "final")
-    findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
+    findings = (*(m.finding(*(change(evidence, m.places, nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
     unknown = found.unknown_torques(evidence, nominal.residuals, after)

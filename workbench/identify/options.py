@@ -113,9 +113,6 @@ class ReadOffOptions:
 
     register_exact: float = 0.005
     """Standard deviation of a value set by a servo's register, as a share: the servo itself calculates with that number."""
-    duty_law: float = 0.03
-    """The same of a gain read from a log's register of duty: the law behind it is an approximation, and six sessions of one
-    STS3215 gave gains 1 to 4 % apart."""
     least_along: float = 0.5
     """Cosine between a link's length and what of it two axes tell, at least."""
     length_error: float = 1e-4

@@ -10,16 +10,16 @@ import numpy as np
 from workbench.compare.logged import register_laws
 from workbench.compare.session_takes import ReadTake
 from workbench.effects.base import Registers
+from workbench.identify.estimators.registers import readings
 from workbench.identify.evidence.options import EvidenceOptions
-from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Rejected
 from workbench.identify.results.reasons import RefutedByRegister
+from workbench.robot import RobotModel
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
     """The servos' registers, log by log."""
-    gains = {joint: (law.gain, max(law.sd["gain"], READ_OFF.duty_law * law.gain)) for joint, law in register_laws(takes).items()}
     out = []
     for t in takes:
         channels, duty = t.recording.channels, {}
@@ -27,17 +27,18 @@ def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
             if (register := channels.get(f"duty.{joint}")) is not None:
                 on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
                 duty[joint] = np.where(on, register, np.nan)
-        out.append(Registers(duty, channels.get("voltage"), gains))
+        out.append(Registers(duty, channels.get("voltage")))
     return out
 
 
-def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
+def within_registers(candidates: Sequence[Candidate], model: RobotModel, takes: Sequence[ReadTake], options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
     """Candidates limited to the range allowed by the registers, and those refuted: for which even `refuted` of the
     typical size is further than `sure` standard errors from the register's value."""
-    logs, kept, refuted = registers_of(takes), [], []
+    logs, of_duty = registers_of(takes), readings(model, register_laws(takes))
+    kept, refuted = list[Candidate](), list[Rejected]()
     for c in candidates:
-        shown = c.effect.in_registers(logs, c.where)
+        shown = c.effect.in_registers(logs, c.where) or of_duty.get(c.key)
         if shown is None:
             kept.append(c)
             continue
