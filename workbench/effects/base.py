@@ -228,7 +228,7 @@ class Effect:
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the unit of docs/formats.md, as the servos' registers show it, and its standard error, or None."""
+        """Its first parameter, in the unit of docs/formats.md, as the servos' registers show it, and its error; None: unknown."""
         return None
 
     def in_duty(self, law: RegisterLaw, servo: ServoConstants) -> tuple[float, float] | None:
