@@ -9,8 +9,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import t as student_t
+from scipy.special import gammaln, stdtrit
 
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
@@ -202,7 +201,7 @@ def start(numbers: Sequence[Uncertain]) -> Hypothesis:
 @lru_cache(maxsize=1024)
 def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> Prior:
     center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
-    freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
+    freedom, furthest = [np.ones(n)], float(stdtrit(options.freedom, 0.995))
     for c in effects:
         low, high = c.bounds()
         shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
