@@ -48,6 +48,8 @@ _RC: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "figure.facecolor": "white",
     "figure.dpi": 100,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
     "savefig.dpi": 144,
     "svg.fonttype": "path",
     "svg.hashsalt": "workbench",
@@ -100,7 +102,7 @@ def panels(count: int, columns: int, width: float, height: float) -> tuple[Figur
     rows = -(-count // columns)
     tall = height * rows + 0.6
     figure = new_figure(width, tall)
-    figure.set_layout_engine("none")
+    figure.set_layout_engine(None)
     across = (width - LEFT - RIGHT - ASIDE * (columns - 1)) / columns
     down = (tall - ABOVE - BELOW - BETWEEN * (rows - 1)) / rows
     place = {"left": LEFT / width, "right": 1 - RIGHT / width, "bottom": BELOW / tall, "top": 1 - ABOVE / tall,
