@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -105,7 +105,7 @@ class Hypothesis:
 
     def slices(self) -> list[slice]:
         """The part of theta that belongs to each effect."""
-        ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
+        ends = accumulate((c.size for c in self.effects), initial=len(self.numbers))
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def alike(self) -> list[list[int]]:
