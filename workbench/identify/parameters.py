@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -66,22 +67,22 @@ class Candidate:
         """Whether its sizes were estimated directly, 1 being the estimate."""
         return not self.effect.from_neutral
 
-    @property
+    @cached_property
     def given(self) -> list[Parameter]:
         """The effect's parameters, but those of options that it does not have here."""
         return [p for p in self.effect.parameters if p.option in ("", *self.options)]
 
-    @property
+    @cached_property
     def parameters(self) -> list[Parameter]:
         """The parameter behind each number; a vector has three."""
         return _by_number(self.given)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """How many numbers are fitted."""
         return self.fixed.count(False)
 
-    @property
+    @cached_property
     def shapes(self) -> Mask:
         """Which sizes belong to numbers that only shape the effect."""
         return np.array([p.shapes for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
@@ -111,7 +112,7 @@ class Candidate:
                 value = t / max(size, t / p.high)
             else:
                 value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
-            out.append(float(np.clip(value, p.low, p.high)))
+            out.append(float(min(max(value, p.low), p.high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:

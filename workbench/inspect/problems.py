@@ -20,8 +20,8 @@ from workbench.files.errors import MistypedError
 from workbench.files.problem import RoutineProblem
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import check_assets, tracks_of
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.plausibility import beyond_range
 from workbench.recording.take_from import named_by_model
@@ -162,7 +162,7 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
         else:
             if model is not None:
                 check_assets(recording, model)
-            out += mend(tracks_of(recording), model).problems
+            out += repaired(recording, model).problems
     elif model is not None:
         named = named_by_model(recording, model)
         frames = model.kinematics.frames

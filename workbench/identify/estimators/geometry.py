@@ -21,8 +21,8 @@ from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import seen_joints, tracks_of, turn_vectors
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import seen_joints, turn_vectors
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 from workbench.types import Array
@@ -129,7 +129,7 @@ def _child_link(model: RobotModel, joint: str) -> str:
 
 
 def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
-    tracks = mend(tracks_of(e.take.recording), model)
+    tracks = repaired(e.take.recording, model)
     return spans(tracks, seen_joints(tracks.assets, model, e.take.spec.base)[0])
 
 
