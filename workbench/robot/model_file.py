@@ -18,7 +18,7 @@ from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.mounting import written_mountings
-from workbench.robot.robot_section import read_model, read_servos
+from workbench.robot.robot_section import check_protocol, read_model, read_servos
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.types import Array
 
@@ -129,6 +129,7 @@ def load_model_file(path: str | Path) -> ModelFile:
     model = read_model(top)
     model = replace(model, servos={**model.servos, **read_servos(top, model.joints)},
                     effects=tuple(_effect(f, model) for f in top.sequence("effects")))
+    check_protocol(Fields(path, {}, "robot"), model.bus_ids, model.servos)
     posterior = _posterior(top.mapping("posterior"), model)
     given = top.mapping("provenance")
     provenance = {} if given is None else dict(given.items())
