@@ -1,5 +1,6 @@
 """Certificates: bound to their table and robot, and asked for by export."""
 
+import hashlib
 import json
 import math
 from dataclasses import replace
@@ -54,6 +55,38 @@ def _again(model, commands, seconds):
     from workbench.simulation import Job, SimulationConfig, simulate_batch
 
     return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
+
+
+@pytest.mark.parametrize("text", [
+    "", "[]", "[1, 2]", "7", "null", "true", '"certificate"', "{}", '{"format": 2}', '{"format": 1}', '{"format": 1, "sha256": []}',
+    "[" * 4000, '{"format": 1' + "0" * 40 + "}", '{"format": NaN}', "{'format': 1}"])
+def test_what_is_no_certificate_is_refused_in_plain_words(tmp_path, text):
+    (tmp_path / NAME).write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_certificate(tmp_path / NAME)
+    assert str(caught.value).startswith(str(tmp_path / NAME))
+    assert "Error" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [[], [3], 3, "three", None, {}, {"a": 1}, [{"a": 1}]])
+def test_a_field_of_another_type_is_named(made, tmp_path, value):
+    """Even where the digest is right, as of a file that another program wrote."""
+    content = made[3].certificate.to_json()
+    for name in ("kept", "request", "tables", "margins", "nominal", "draws", "ways", "cycle", "shape", "provenance"):
+        if isinstance(value, dict) and isinstance(content[name], dict) and name not in ("nominal", "ways", "cycle"):
+            continue
+        if (name, value) in (("margins", []), ("request", "three"), ("cycle", {})):
+            continue
+        (tmp_path / NAME).write_text(json.dumps(_digested({**content, name: value})))
+        with pytest.raises(InputError, match=f"{name} has other content") as caught:
+            read_certificate(tmp_path / NAME)
+        assert "Error" not in str(caught.value)
+
+
+def _digested(content):
+    rest = {k: v for k, v in content.items() if k != "sha256"}
+    return {**rest, "sha256": hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()}
 
 
 def test_says_what_there_is_to_say(made):
