@@ -11,8 +11,8 @@ T = TypeVar("T")
 
 
 class Cache(Generic[T]):
-    """Values by key; beyond `most`, the one that was asked for longest ago is dropped. Threads may share a cache: two that ask for the same value at
-    once both make it."""
+    """Values by key; beyond `most`, the one that was asked for longest ago is dropped. Threads may share a cache: two that ask
+    for the same value at once both make it."""
 
     def __init__(self, most: int) -> None:
         self.most = most

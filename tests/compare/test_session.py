@@ -127,7 +127,7 @@ def test_base_left_out_follows_the_model(tmp_path):
     (changed(robot__bus_ids__two=1), ["robot.bus_ids.", "bus ID"]),
     (changed(robot__bus_ids__two=254), ["robot.bus_ids.two", "from 0 to 253"]),
     (changed(robot__bus_ids__two=253, robot__servos={"model": "XL-330"}), ["robot.bus_ids.two", "at most 252", "protocol 2"]),
-    (changed(ground__friction=-1), ["ground.friction", "at least 0"]),
+    (changed(ground__friction=-1), ["ground.friction", "non-negative"]),
     (changed(predict=[{"name": "p", "base": "fixed"}]), ["predict[0].motion", "either motion"]),
     (changed(predict=[{"name": "p", "motion": "motions/wave.csv", "base": "fixed"}]), ["predict[0].start", "is missing"]),
     ("format: 1\nformat: 1\n", ["duplicate key 'format'"]),

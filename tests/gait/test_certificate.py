@@ -58,8 +58,8 @@ def _again(model, commands, seconds):
 
 
 @pytest.mark.parametrize("text", [
-    "", "[]", "[1, 2]", "7", "null", "true", '"certificate"', "{}", '{"format": 2}', '{"format": 1}', '{"format": 1, "sha256": []}',
-    "[" * 4000, '{"format": 1' + "0" * 40 + "}", '{"format": NaN}', "{'format': 1}"])
+    "", "[]", "[1, 2]", "7", "null", "true", '"certificate"', "{}", '{"format": 2}', '{"format": 1}',
+    '{"format": 1, "sha256": []}', "[" * 4000, '{"format": 1' + "0" * 40 + "}", '{"format": NaN}', "{'format': 1}"])
 def test_what_is_no_certificate_is_refused_in_plain_words(tmp_path, text):
     (tmp_path / NAME).write_text(text)
     with pytest.raises(InputError) as caught:

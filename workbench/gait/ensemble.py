@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
 from workbench.files import InputError
@@ -131,6 +132,7 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
             low, high = (float(f.required(k, f.number(k, least=0))) for k in ("low", "high"))
             if high < low:
                 raise f.error("high", f"expected at least {low:g}, got {high:g}")
+            _check_bounds(f, key, low, high)
             f.done()
             ranges[key] = (low, high)
 
@@ -149,6 +151,15 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
     return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
 
 
+def _check_bounds(f: Fields, key: str, low: float, high: float) -> None:
+    """InputError where a range exceeds what the effect that it draws can have."""
+    name, parameter = EFFECTS[key]
+    p = next(p for p in effect_named(name).parameters if p.name == parameter)
+    for bound, value in (("low", low), ("high", high)):
+        if not p.low <= value <= p.high:
+            raise f.error(bound, f"expected {p.low:g} to {p.high:g} {p.unit.removeprefix('1')}".rstrip() + f", got {value:g}")
+
+
 def _is_diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
     """Whether a diagnosis found this effect at this place: there it is better known than the file's range, and nowhere else."""
     return (drawn.effect, EVERYWHERE) in known or any((drawn.effect, place) in known for place in drawn.where)
@@ -156,8 +167,6 @@ def _is_diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
 
 def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Generator) -> RobotModel:
     """The diagnosed model with its effects' parameters drawn jointly, kept within the effects' bounds."""
-    from workbench.effects.registry import effect_named
-
     assert list(posterior.names) == list(parameter_names(model.effects))
     known_well = np.isfinite(np.diag(posterior.covariance))  # what the data say nothing about stays at its mean
     covariance = np.where(np.outer(known_well, known_well), posterior.covariance, 0.0)

@@ -141,6 +141,7 @@ def model_problems_of(model: RobotModel) -> list[str]:
     out = list(model.held_problems if model.held else model.problems)
     doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
     out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
+    out += model.ground.doubts
     given = set(model.servos)
     lacking = [j for j in model.joints if j not in given]
     if given and lacking:

@@ -8,6 +8,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import Fields, read_yaml
+from workbench.physical import GROUND
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.mounting import Mounting, read_lerobot, read_mountings
 from workbench.robot.names import BUS_IDS, HIGHEST_BUS_ID, HIGHEST_ID, RIGID_BODIES
@@ -50,12 +51,12 @@ def read_model(top: Fields) -> RobotModel:
 def _ground(f: Fields | None) -> Ground | None:
     if f is None:
         return None
-    ground = Ground(
-        friction=f.number("friction", least=0), stiffness=f.number("stiffness", least=0, finite=False),
-        dissipation=f.number("dissipation", least=0),
-    )
+    given = {key: f.number(key, finite=not GROUND[key].infinite) for key in GROUND}
     f.done()
-    return ground
+    try:
+        return Ground(**given)
+    except InputError as e:
+        raise InputError(f.path, f"{f.place}.{e.problem}") from None
 
 
 def _packages(f: Fields) -> dict[str, str]:
