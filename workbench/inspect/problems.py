@@ -146,7 +146,9 @@ def model_problems_of(model: RobotModel) -> list[str]:
     lacking = [j for j in model.joints if j not in given]
     if given and lacking:
         out.append(f"servos: none is given for {', '.join(lacking)}; taken as an AX-12A")
-    list(resolve(model))  # InputError for an invalid effect
+    acting = [" ".join([e.effect, *sorted(e.where)]) for _, e, _ in resolve(model)]  # InputError for an invalid effect
+    out += [f"effect '{name}' is given {acting.count(name)} times: they act together" for name in dict.fromkeys(acting)
+            if acting.count(name) > 1]
     return out
 
 
@@ -164,12 +166,22 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
             if model is not None:
                 check_assets(recording, model)
             out += mend(tracks_of(recording), model).problems
+            out += _nothing_moved(recording)
     elif model is not None:
         named = named_by_model(recording, model)
         frames = model.kinematics.frames
         out += _not_logged(named, model)
         out += beyond_range(named, {j: (frames[j].lower, frames[j].upper) for j in model.joints})
     return sorted(dict.fromkeys(out), key=lambda text: isinstance(text, RoutineProblem))
+
+
+def _nothing_moved(recording: Recording) -> list[str]:
+    """A line if every body keeps its pose to the last digit throughout: cameras that see a body give it noise."""
+    paths = [np.hstack([body.p, body.quat]) for body in recording.rigid_bodies.values()]
+    seen = [path[np.isfinite(path).all(axis=1)] for path in paths]
+    if len(recording.time) < FILES.fewest_frames or any(len(path) and np.ptp(path, axis=0).any() for path in seen):
+        return []
+    return ["no body ever moves, to the last digit: was one pose exported, or was the capture paused?"]
 
 
 def _not_logged(log: Recording, model: RobotModel) -> list[str]:
