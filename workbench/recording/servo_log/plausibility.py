@@ -59,9 +59,11 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     _check_bounds(recording, checks)
     if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
-    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
+    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording), *_no_reading(recording)]
     if len(time) < 3:
         return replace(recording, problems=tuple(problems))
+    if np.median(np.diff(time)) < checks.fast:  # what follows compares with the times in which servos answer
+        return replace(recording, problems=(*problems, *_clock(recording, checks)))
     exchanged = {j: text for j, text in reversed_roles(recording)
                  if _shift_of_equals(channels[f"goal.{j}"], channels[f"position.{j}"], checks) is None}
     problems += exchanged.values()
@@ -87,6 +89,12 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
     return as_logged(replace(mended.recording, problems=tuple(problems)))
+
+
+def _no_reading(r: Recording) -> list[str]:
+    """A line for each position without a reading in any row."""
+    read = {name: values for j in r.joints if (values := r.channels.get(name := f"position.{j}")) is not None}
+    return [f"{name}: holds no reading in any row" for name, values in read.items() if not np.isfinite(values).any()]
 
 
 def _check_bounds(r: Recording, c: LogChecks) -> None:
