@@ -89,7 +89,7 @@ STRONGEST = 75.0
 """Stall torque times speed without load [W]: XH540 52, the strongest servos of model cars 66."""
 
 GROUND: Mapping[str, PhysicalRange] = MappingProxyType({
-    "friction": PhysicalRange("", most=5.0, low=0.02, high=1.5, why="feet on floors have", perhaps="in per cent"),
+    "friction": PhysicalRange("", most=5.0, low=0.02, high=1.5, why="feet on floors have", perhaps="a typing mistake"),
     "stiffness": PhysicalRange("N/m", least=10.0, low=200.0, why="floors that robots walk on have", infinite=True),
     "dissipation": PhysicalRange("s/m", most=1e5, high=1e3, why="floors have", perhaps="in s/mm"),
 })

@@ -257,7 +257,20 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    return [*_too_long(seconds), *out], seconds
+    return [*_unlikely(take, model, seconds), *_too_long(seconds), *out], seconds
+
+
+def _unlikely(take: TakeSpec, model: RobotModel, seconds: float) -> list[str]:
+    """Entries of a take that have no effect or cannot be meant, and a duration that shows nothing."""
+    out = []
+    if seconds < FILES.shortest:
+        out.append(f"lasts {seconds:.3g} s: a search compares stretches of {FILES.shortest:g} s; record longer takes")
+    if take.cycles is not None and take.motion is None:
+        out.append(f"cycles: {take.cycles} has no effect: the take has no motion, its commands are those of the recording")
+    if take.load is not None and take.load.mass > model.kinematics.mass:
+        out.append(f"load: {take.load.mass:g} kg weighs more than the robot ({model.kinematics.mass:.3g} kg): is it in another "
+                   "unit?")
+    return out
 
 
 def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:

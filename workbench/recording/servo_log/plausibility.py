@@ -134,8 +134,8 @@ def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
         unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
         yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
     elif middle < c.fast:
-        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in "
-               f"{'minutes' if 60 * middle > c.fast else 'hours'}?")
+        unit = next((unit for unit, seconds in (("minutes", 60), ("hours", 3600)) if seconds * middle > c.fast), "another unit")
+        yield f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in {unit}?"
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))
