@@ -52,7 +52,7 @@ def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
 
 def _folder(text: str) -> Path:
     """A folder's path, for argparse; refuses an empty one, which is an unset shell variable rather than the current folder."""
-    if not text:
+    if not text or "\0" in text:
         raise argparse.ArgumentTypeError("expected a folder")
     return Path(text)
 

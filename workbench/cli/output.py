@@ -96,8 +96,14 @@ def _publish(partial: Path, out: Path) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         partial.rename(out)
         return
-    for source in sorted(p for p in partial.rglob("*") if not p.is_dir()):
-        target = out / source.relative_to(partial)
+    moves = {p: out / p.relative_to(partial) for p in sorted(partial.rglob("*")) if not p.is_dir()}
+    for target in moves.values():  # all before the first is moved
+        if target.is_dir():
+            raise InputError(target, "cannot be written (a folder has this name)")
+        blocked = next((p for p in target.parents if p.is_relative_to(out) and p.exists() and not p.is_dir()), None)
+        if blocked is not None:
+            raise InputError(target, f"cannot be written ({blocked} is a file)")
+    for source, target in moves.items():
         target.parent.mkdir(parents=True, exist_ok=True)
         source.replace(target)
 
