@@ -13,10 +13,10 @@ import numpy as np
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
-from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, read_yaml
 from workbench.gait.legs import legs_of
+from workbench.physical import MASS
 from workbench.robot import EffectSpec, RobotModel, data_file
 from workbench.robot.model_file import Posterior, parameter_names
 
@@ -119,6 +119,12 @@ def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -
     return model.with_masses(path, masses)
 
 
+MOST_SHARE = 0.9
+"""By which the mass of a link may vary: at 1, a link may have none."""
+MOST_ZERO = 15.0
+"""Standard deviation of a zero [deg]: at three of them, a horn sits two teeth off."""
+
+
 def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = None) -> Ensemble:
     """Reads the file (default: the bundled one). InputError names file, key and the expected value."""
     path = data_file(BUNDLED) if path is None else Path(path)
@@ -136,17 +142,16 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
             f.done()
             ranges[key] = (low, high)
 
-    def one(key: str, name: str) -> float:
+    def one(key: str, name: str, most: float) -> float:
         f = top.mapping(key)
         if f is None:
             return 0.0
-        value = float(f.required(name, f.number(name, least=0)))
+        value = float(f.required(name, f.number(name, least=0, most=most)))
         f.done()
         return value
 
-    mass, payload, zero = one("link_mass", "share"), one("payload", "mass"), one("zero_offset", "sd")
-    if mass >= 1:
-        raise InputError(path, f"link_mass.share: expected less than 1, got {mass:g}")
+    mass, zero = one("link_mass", "share", MOST_SHARE), one("zero_offset", "sd", MOST_ZERO)
+    payload = one("payload", "mass", MASS.most)
     top.done()
     return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
 
