@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.inputs.corpus import as_csv, motive
+from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.inspect.problems import recording_problems
 from workbench.recording import Recording, read_recording
@@ -164,3 +165,29 @@ def test_what_a_c3d_leaves_open_is_told(tmp_path: Path) -> None:
     found = read_recording(path)
     assert "markers never seen: b_2" in found.problems
     assert list(found.rigid_bodies) == ["b"]
+
+
+WALK = Path(__file__).parents[2] / "data" / "synthetic_walk"
+
+
+def _exchanged(source: Path, to: Path, order: str) -> None:
+    """The walk with the values under X, Y, Z, W of every body taken from the columns `order`; the header stays."""
+    lines = source.read_text().splitlines()
+    head = next(k for k, line in enumerate(lines) if line.startswith("Frame"))
+    kinds, axes = (np.array(line.split(",")) for line in lines[head - 1:head + 1])
+    columns = {name: np.flatnonzero((kinds == "Rotation") & (axes == name)) for name in "XYZW"}
+    rows = np.array([line.split(",") for line in lines[head + 1:]], dtype=object)
+    moved = rows.copy()
+    for name, value in zip("XYZW", order):
+        moved[:, columns[name]] = rows[:, columns[value]]
+    to.write_text("\n".join([*lines[:head + 1], *(",".join(row) for row in moved)]) + "\n")
+
+
+@pytest.mark.parametrize("order", ["XYZW", "YXZW", "XZYW", "ZYXW", "YZXW", "ZXYW", "WXYZ"])
+def test_the_robots_joints_show_exchanged_components(tmp_path: Path, order: str) -> None:
+    """Not even the header tells: the values alone were moved, by all bodies alike."""
+    _exchanged(WALK / "walk.csv", tmp_path / "walk.csv", order)
+    problems = recording_problems("x", read_recording(tmp_path / "walk.csv"), load_session(WALK).model)
+    told = [text for text in problems if "are the columns exchanged?" in text]
+    assert len(told) == (order != "XYZW")
+    assert all(f"if its X,Y,Z,W hold {','.join(order)}: " in text for text in told)
