@@ -13,7 +13,7 @@ from workbench.cli.check import check_table_of
 from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
-from workbench.gait.certify import CertifyOptions, certify
+from workbench.gait.certify import CertifyOptions, Examination, certify
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
@@ -55,6 +55,23 @@ def _again(model, commands, seconds):
     from workbench.simulation import Job, SimulationConfig, simulate_batch
 
     return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
+
+
+def test_what_the_robots_refuse_is_known_before_the_rest_is_simulated(made, monkeypatch, tmp_path):
+    _, machine, table, certified = made
+    request = replace(certified.request, limits=replace(certified.request.limits, tilt=1e-4))
+    draws = load_ensemble().draws(machine.model, 2, 7, tmp_path)
+    examination = Examination(machine, request, table, draws, replace(OPTIONS, watched=0, trimmed=0), lambda what, done: None, {})
+    with monkeypatch.context() as m:
+        m.setattr(Examiner, "variant", lambda *_: pytest.fail("simulated although the robots refuse the gait"))
+        assert examination.refusal is not None
+        assert examination.refusal.name.startswith("tilt")
+    rest = examination.finish().certificate
+    assert not rest.kept
+    assert examination.refusal in rest.margins
+    assert [m.name for m in rest.margins if m.name not in ("speed of the worse half of draws",)] == [
+        m.name for m in certified.certificate.margins if m.name not in ("way back to its cycle", "drift after 3 recorded metres")
+        and "engine" not in m.name and "itself" not in m.name]
 
 
 @pytest.mark.parametrize("text", [
