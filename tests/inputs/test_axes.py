@@ -170,12 +170,12 @@ def test_what_a_c3d_leaves_open_is_told(tmp_path: Path) -> None:
 WALK = Path(__file__).parents[2] / "data" / "synthetic_walk"
 
 
-def _exchanged(source: Path, to: Path, order: str) -> None:
-    """The walk with the values under X, Y, Z, W of every body taken from the columns `order`; the header stays."""
+def _exchanged(source: Path, to: Path, order: str, kind: str = "Rotation") -> None:
+    """The walk with the values of a kind under X, Y, Z, W of every body taken from the columns `order`; the header stays."""
     lines = source.read_text().splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("Frame"))
     kinds, axes = (np.array(line.split(",")) for line in lines[head - 1:head + 1])
-    columns = {name: np.flatnonzero((kinds == "Rotation") & (axes == name)) for name in "XYZW"}
+    columns = {name: np.flatnonzero((kinds == kind) & (axes == name)) for name in order}
     rows = np.array([line.split(",") for line in lines[head + 1:]], dtype=object)
     moved = rows.copy()
     for name, value in zip("XYZW", order):
@@ -191,3 +191,13 @@ def test_the_robots_joints_show_exchanged_components(tmp_path: Path, order: str)
     told = [text for text in problems if "are the columns exchanged?" in text]
     assert len(told) == (order != "XYZW")
     assert all(f"if its X,Y,Z,W hold {','.join(order)}: " in text for text in told)
+
+
+@pytest.mark.parametrize(("order", "said"), [
+    ("YXZ", "hold Y,X,Z: are the columns of the positions exchanged?"), ("XZY", "hold X,Z,Y: are the columns of the positions"),
+    ("YZX", "hold Y,Z,X: are the columns of the positions exchanged?"), ("ZYX", "the mirror image of the robot's links"),
+    ("ZXY", "say that z is up in this export")])
+def test_the_robots_links_show_exchanged_positions(tmp_path: Path, order: str, said: str) -> None:
+    _exchanged(WALK / "walk.csv", tmp_path / "walk.csv", order, "Position")
+    problems = recording_problems("x", read_recording(tmp_path / "walk.csv"), load_session(WALK).model)
+    assert any(said in text for text in problems)
