@@ -81,8 +81,8 @@ def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | Non
     if min(mirrored, exchanged, moved) > _BETTER * now:
         return None
     if moved < _BETTER * min(mirrored, exchanged):
-        return (f"the bodies' first places fit the robot's links if the file's X,Y,Z hold {','.join(order)}: are the columns of the "
-                "positions exchanged?")
+        return (f"the bodies' first places fit the robot's links if the file's X,Y,Z hold {','.join(order)}: are the columns of "
+                "the positions exchanged?")
     if mirrored <= exchanged:
         return ("the bodies' first places are the mirror image of the robot's links: are the capture's axes left-handed, or are "
                 "all bodies of the left and the right exchanged? Export again with right-handed axes, or correct `rigid_bodies`")
