@@ -201,3 +201,25 @@ def test_the_robots_links_show_exchanged_positions(tmp_path: Path, order: str, s
     _exchanged(WALK / "walk.csv", tmp_path / "walk.csv", order, "Position")
     problems = recording_problems("x", read_recording(tmp_path / "walk.csv"), load_session(WALK).model)
     assert any(said in text for text in problems)
+
+
+def test_what_a_trc_contradicts_is_told_or_refused(tmp_path: Path) -> None:
+    own = _trc("X1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3")
+    slow = _read(tmp_path, own.replace("100\t100\t60", "25\t100\t60"), "a.trc")
+    assert "the header says 25 frames a second, the times 100; the times are used" in slow.problems
+    assert slow.rate == pytest.approx(100)
+    assert "two markers are called 'leg_1': the first is read" in _read(tmp_path, own.replace("leg_2", "leg_1"), "b.trc").problems
+    lines = own.splitlines()
+    wider = "\n".join([*lines[:20], f"{lines[20]}\t1\t2\t3", *lines[21:]]) + "\n"
+    with pytest.raises(InputError, match="line 21: TRC: 12 numbers of 3 markers; expected 9"):
+        _read(tmp_path, wider, "c.trc")
+
+
+@pytest.mark.parametrize(("columns", "said"), [
+    ("x,y,z,qw,qx,qy,qz,x", "column 'leg.x' is given twice"), ("x_mm,y,z,qw,qx,qy,qz", "in metres and in millimetres"),
+    ("x,y,z,qw,qx,qy,qz,x_mm", "in metres and in millimetres")])
+def test_columns_of_poses_that_contradict_each_other_are_refused(tmp_path: Path, columns: str, said: str) -> None:
+    names = columns.split(",")
+    rows = [f"{k / 100}" + ",0" * len(names) for k in range(30)]
+    with pytest.raises(InputError, match=said):
+        _read(tmp_path, "\n".join([",".join(["time", *(f"leg.{name}" for name in names)]), *rows]) + "\n")

@@ -8,13 +8,15 @@ from pathlib import Path
 import pytest
 
 from tests.command import refused
+from tests.inputs.corpus import SERVO as SERVO_FILE
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.gait.ensemble import load_ensemble
 from workbench.inspect.problems import model_problems_of
 from workbench.physical import GROUND, MASS, SERVO, TIME_STEP
-from workbench.robot import Ground, load_model, puppy_model
+from workbench.robot import Ground, load_model, load_servo_constants, puppy_model
 from workbench.robot.servo_constants import ServoConstants
+from workbench.robot.torque_table import TorqueTable
 from workbench.simulation import SimulationConfig
 
 
@@ -83,3 +85,15 @@ def test_steps_and_masses() -> None:
     assert MASS.problem(200.0) == "expected at most 5 kg, got 200"
     assert GROUND["stiffness"].problem(math.inf) is None
     assert GROUND["stiffness"].problem(5.0) == "expected at least 10 N/m, got 5"
+
+
+def test_a_torque_that_no_servo_bears_is_refused_in_tables() -> None:
+    with pytest.raises(InputError, match=r"torque: expected at most 200 N m, got 2000"):
+        TorqueTable("angle", (0.0, 1.0), (0.0, -2000.0))
+    assert TorqueTable("angle", (0.0, 1.0), (0.0, -0.01)).torque == (0.0, -0.01)
+
+
+def test_a_standard_deviation_beyond_its_value_is_told(tmp_path: Path) -> None:
+    (tmp_path / "servo.yaml").write_text(SERVO_FILE.replace("supply_voltage: 11.1", "supply_voltage: {value: 11.1, sd: 1000}"))
+    (told,) = load_servo_constants(tmp_path / "servo.yaml").doubts
+    assert told.startswith("supply_voltage: sd 1000 is more than 3 times its value")

@@ -180,9 +180,13 @@ class ServoConstants:
         if self.coulomb_friction >= self.torque_at_full_duty:
             out.append(f"coulomb_friction: {self.coulomb_friction:g} N m holds the servo against its whole torque "
                        f"({self.torque_at_full_duty:.3g} N m at {self.supply_voltage:g} V): it cannot move")
+        out += [f"{key}: sd {sd:g} is more than {MOST_UNKNOWN:g} times its value: was a share meant, or another number?"
+                for key, sd in self.sd if sd > MOST_UNKNOWN * abs(float(getattr(self, key) or math.inf))]
         return tuple(out)
 
 
+MOST_UNKNOWN = 3.0
+"""Standard deviation of a constant by its value: guesses are known to a factor of 3."""
 SHARES_KNOWN = {"supply_voltage": 0.10, "no_load_speed": 0.10, "coulomb_friction": 0.5, "viscous_friction": 0.5,
                 "reflected_inertia": 0.15}
 """How well a hobby servo's numbers are known where its servo.yaml does not say: supply and motor constant to what servos of one

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,14 @@ from workbench.files import InputError
 from workbench.files.numerals import number_of
 from workbench.files.tables import is_binary, plain_text, split_row
 from workbench.recording.formats.capture_table import METRES, Capture, recording_of
+from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
 _FIRST = b"PathFileType"
+_DISAGREE = 0.02
+"""Allowed difference of the header's rate from that of the times, which are rounded, as a share."""
 
 
 def matches(head: bytes) -> bool:
@@ -37,6 +42,8 @@ def read_trc(path: Path) -> Recording:
     table = np.full((len(rows), 3 * len(names)), np.nan)
     time = np.empty(len(rows))
     for k, (n, row) in enumerate(rows):
+        if any(row[2 + table.shape[1]:]):
+            raise InputError(source, f"line {n}: TRC: {len(row) - 2} numbers of {len(names)} markers; expected {table.shape[1]}")
         value = number_of(row[1]) if len(row) > 1 else None
         if value is None:
             raise InputError(source, f"line {n}: TRC: expected a frame's number, its time and its markers")
@@ -47,8 +54,20 @@ def read_trc(path: Path) -> Recording:
                 if found is None:
                     raise InputError(source, f"line {n}, column {i + 3}: TRC: expected a number, got '{cell[:40]}'")
                 table[k, i] = found * METRES[unit.lower()]
-    markers = {name: table[:, at[i]] for i, name in enumerate(names)}
-    return recording_of(source, "trc", Capture(time, {}, markers, up="y", units=unit, problems=problems))
+    markers: dict[str, np.ndarray] = {}
+    for i, name in enumerate(names):
+        if name in markers:
+            problems = (*problems, f"two markers are called '{name}': the first is read")
+        markers.setdefault(name, table[:, at[i]])
+    return recording_of(source, "trc", Capture(time, {}, markers, up="y", units=unit, problems=(*problems, *_rate(about, time))))
+
+
+def _rate(about: Mapping[str, str], time: Array) -> list[str]:
+    """A line if the header's rate is not that of the times (N,) [s]."""
+    said, measured = number_of(about.get("DataRate", "")), rate_of(time)
+    if said is None or not np.isfinite(measured) or abs(said / measured - 1) < _DISAGREE:
+        return []
+    return [f"the header says {said:g} frames a second, the times {measured:.4g}; the times are used"]
 
 
 def _places(source: str, names: list[str], axes: list[str]) -> tuple[list[list[int]], tuple[str, ...]]:

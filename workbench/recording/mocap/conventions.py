@@ -77,11 +77,11 @@ def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | Non
     in_file = capture_axes(places)
     orders = {order: _misfit(model_axes(in_file[:, [order.index(name) for name in _NAMES]]), links)
               for order in map("".join, permutations(_NAMES)) if order != _NAMES}
-    order, moved = min(orders.items(), key=lambda pair: pair[1])
+    held, moved = min(orders.items(), key=lambda pair: pair[1])
     if min(mirrored, exchanged, moved) > _BETTER * now:
         return None
     if moved < _BETTER * min(mirrored, exchanged):
-        return (f"the bodies' first places fit the robot's links if the file's X,Y,Z hold {','.join(order)}: are the columns of "
+        return (f"the bodies' first places fit the robot's links if the file's X,Y,Z hold {','.join(held)}: are the columns of "
                 "the positions exchanged?")
     if mirrored <= exchanged:
         return ("the bodies' first places are the mirror image of the robot's links: are the capture's axes left-handed, or are "
