@@ -12,6 +12,7 @@ from workbench.cache import Cache
 from workbench.files.problem import RoutineProblem
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
+from workbench.recording.mocap.exchanged_axes import exchanged_components
 from workbench.recording.mocap.swaps import unswap
 from workbench.recording.mocap.tracks import Tracks, tracks_of
 from workbench.recording.mocap.unseen import without_unseen
@@ -47,6 +48,8 @@ def mend(tracks: Tracks, model: RobotModel | None = None) -> Tracks:
     tracks = without_unseen(tracks)
     if model is not None:
         tracks = conventional(tracks, model)
+        if (text := exchanged_components(tracks, model)) is not None:
+            tracks = replace(tracks, problems=(*tracks.problems, text))
     tracks = _continuous_signs(tracks)
     tracks = unswap(tracks, model)
     tracks = _without_spikes(tracks)
