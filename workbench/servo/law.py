@@ -48,7 +48,7 @@ class ServoLaw:
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
         """Stacks the constants of one servo a joint."""
         columns = np.array([_constants(s) for s in servos], dtype=float).reshape(-1, 13).T.copy()
-        return ServoLaw(*columns, tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
+        return ServoLaw(*columns, tables=tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
 
     @property
     def line(self) -> TorqueSpeedLine:
