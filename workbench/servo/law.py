@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -48,7 +48,8 @@ class ServoLaw:
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
         """Stacks the constants of one servo a joint."""
         columns = np.array([_constants(s) for s in servos], dtype=float).reshape(-1, 13).T.copy()
-        return ServoLaw(*columns, tables=tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
+        tables = tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables)
+        return replace(ServoLaw(*columns), tables=tables) if tables else ServoLaw(*columns)
 
     @property
     def line(self) -> TorqueSpeedLine:
