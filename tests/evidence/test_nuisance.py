@@ -8,7 +8,7 @@ import yaml
 
 from tests.evidence.linear import JOINT, candidate
 from tests.servo_rig import rig_model
-from workbench.effects.base import Registers
+from workbench.effects.registers import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError

@@ -53,6 +53,24 @@ def test_two_effects_are_named_with_their_sizes():
     assert np.sqrt(np.diag(p.best.covariance(found.region, OPTIONS)))[-1] < 0.1
 
 
+class Held(Linear):
+    """Dry friction holds the joint: more of it changes nothing."""
+
+    def left(self, h):
+        sizes = [np.minimum(x, 0.0) if c.name == "coulomb_friction" else x for c, x in h.sizes()]
+        return super().left(h.at(np.concatenate([h.z, *sizes])))
+
+
+def test_a_nominal_friction_that_is_too_large_is_named_even_if_it_holds_the_joint():
+    r = robot({"coulomb_friction": -3.5})
+    less = replace(r.regions[0].candidates[0], lowest=(-0.15,))
+    of = replace(r.regions[0], candidates=(less, *r.regions[0].candidates[1:]))
+    for kind in (Linear, Held):
+        _, _, p = searched(kind(**{**vars(r), "regions": (of,)}))
+        assert {c.name: x[0] for c, x in p.best.hypothesis.sizes()} == pytest.approx({"coulomb_friction": -3.5}, rel=0.05)
+        assert p.named["coulomb_friction", ("j",)] > 0.9
+
+
 class Coarse(Linear):
     """At a coarse step dry friction does a third more than it does."""
 

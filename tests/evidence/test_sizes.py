@@ -26,6 +26,18 @@ def test_one_in_a_hundred_is_beyond_what_the_effect_says(name, neutral, beyond):
     assert quad(lambda v: np.exp(prior.log(np.array([v]))), 0.0, np.inf)[0] == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("nominal", [0.0, 0.001, 0.03, 0.15, 10.0])
+def test_the_prior_of_friction_ends_where_all_of_it_is_taken_away(nominal):
+    c = Candidate.of(KNOWN["coulomb_friction"], ("j",), (0.0,), lowest=(-nominal,))
+    prior = Prior.of(start(()).with_effect(c, np.array([1.0])), EvidenceOptions())
+    low, _ = c.bounds()
+    assert c.values(low) == [-nominal]
+    assert c.values(low - 1.0) == [-nominal]
+    ends = [quad(lambda v: np.exp(prior.log(np.array([v]))), *side, limit=200)[0] for side in ((low[0], 0.0), (0.0, np.inf))]
+    assert sum(ends) == pytest.approx(1.0, rel=1e-3)
+    assert list(c.takes_away) == [nominal >= 0.25 * 0.03]
+
+
 def test_twelve_degrees_of_play_cost_more_than_where_nobody_says_what_is_usual():
     (_, play), (_, soft) = prior_of("backlash", 0.0), prior_of("joint_compliance", np.inf)
     cost = [p.log(np.array([1.0])) - p.log(np.array([12.0])) for p in (play, soft)]

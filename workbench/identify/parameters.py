@@ -26,7 +26,7 @@ class Candidate:
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
     that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
     numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the formats page's
-    units, by number; empty: they are not told."""
+    units, by number; empty: they are not told. lowest: `Effect.lowest` of all the effect's parameters; empty: `Parameter.low`."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -36,15 +36,17 @@ class Candidate:
     reach: float = math.inf
     options: tuple[str, ...] = ()
     spread: tuple[float, ...] = ()
+    lowest: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
-           fixed: Sequence[bool] | None = None, options: tuple[str, ...] = ()) -> Self:
-        """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own."""
+           fixed: Sequence[bool] | None = None, options: tuple[str, ...] = (), lowest: tuple[float, ...] = ()) -> Self:
+        """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own. lowest: as of the
+        class."""
         given = [(p, n) for p, n in zip(_by_number(effect.parameters), neutral) if p.option in ("", *options)]
         own = tuple(p.typical_beside(n) for p, n in given)
         return cls(effect, where, tuple(n for _, n in given), tuple(typical or own), tuple(fixed or (False,) * len(own)),
-                   options=options)
+                   options=options, lowest=lowest)
 
     @property
     def name(self) -> str:
@@ -77,6 +79,19 @@ class Candidate:
         return _by_number(self.given)
 
     @property
+    def least(self) -> list[float]:
+        """The smallest possible value of each number, in the units of docs/formats.md."""
+        lowest = dict(zip((p.name for p in self.effect.parameters), self.lowest))
+        return [lowest.get(p.name, p.low) for p in self.parameters]
+
+    @property
+    def takes_away(self) -> Mask:
+        """Which sizes may be noticeably negative, because the effect can take away a constant of this robot."""
+        far = [low < p.low and p.low - low >= FIT.least_taken * abs(t - n)
+               for p, low, n, t in zip(self.parameters, self.least, self.neutral, self.typical)]
+        return np.array([x for x, fixed in zip(far, self.fixed) if not fixed], dtype=bool)
+
+    @property
     def size(self) -> int:
         """How many numbers are fitted."""
         return self.fixed.count(False)
@@ -103,7 +118,7 @@ class Candidate:
         """Parameters in the units of docs/formats.md, limited to their bounds; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
-        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+        for p, low, n, t, fixed in zip(self.parameters, self.least, self.neutral, self.typical, self.fixed):
             size = 1.0 if fixed else next(sizes)
             if fixed:
                 value = t
@@ -111,7 +126,7 @@ class Candidate:
                 value = t / max(size, t / p.high)
             else:
                 value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
-            out.append(float(np.clip(value, p.low, p.high)))
+            out.append(float(np.clip(value, low, p.high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:
@@ -123,7 +138,7 @@ class Candidate:
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of the sizes x, lower and upper."""
         low, high = [], []
-        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+        for p, least, n, t, fixed in zip(self.parameters, self.least, self.neutral, self.typical, self.fixed):
             if fixed:
                 continue
             if math.isinf(n):
@@ -133,7 +148,7 @@ class Candidate:
             else:
                 near, far = (n * math.exp(-self.reach), n * math.exp(min(self.reach, 100.0))) if p.logarithmic else (
                     n - self.reach, n + self.reach)
-                ends = [_size(p, end, n, t) for end in (max(p.low, near), min(p.high, far))]
+                ends = [_size(p, end, n, t) for end in (max(least, near), min(p.high, far))]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)

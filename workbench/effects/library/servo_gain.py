@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.effects.base import Parameter, Registers, mean_of_logs
+from workbench.effects.base import Parameter
+from workbench.effects.registers import Registers, mean_of_logs
 from workbench.effects.servo_constant import ServoConstant
 from workbench.robot import EffectSpec, RobotModel
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.compare.session_takes import ReadTake
-from workbench.effects.base import Registers
+from workbench.effects.registers import Registers
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Rejected
