@@ -51,7 +51,7 @@ def test_the_ratio_is_that_of_the_densities_at_zero():
         made = np.arange(own.start, own.stop)[c.makes]
         x, V = fit.hypothesis.theta[made], covariance[np.ix_(made, made)]
         density = multivariate_normal(x, V).logpdf(np.zeros(len(made)))
-        assert not prior.lowest[made].any()
-        density -= np.sum(norm.logcdf(x / np.sqrt(np.diag(V))))
+        ended = prior.one_sided[made]
+        density -= np.sum(norm.logcdf(np.abs(x) / np.sqrt(np.diag(V)))[ended])
         odds = prior.at_center[made].sum() - density + log_odds(6, OPTIONS.expected)
         assert (said[c].behind if c in said else 0.0) == pytest.approx(max(0.0, -odds))

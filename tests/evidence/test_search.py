@@ -54,21 +54,22 @@ def test_two_effects_are_named_with_their_sizes():
 
 
 class Held(Linear):
-    """Dry friction holds the joint: more of it changes nothing."""
+    """Dry friction holds the joint: more of it changes nothing, less does the opposite of what more would do."""
 
     def left(self, h):
-        sizes = [np.minimum(x, 0.0) if c.name == "coulomb_friction" else x for c, x in h.sizes()]
+        sizes = [-x * c.less if c.name == "coulomb_friction" else x for c, x in h.sizes()]
         return super().left(h.at(np.concatenate([h.z, *sizes])))
 
 
 def test_a_nominal_friction_that_is_too_large_is_named_even_if_it_holds_the_joint():
     r = robot({"coulomb_friction": -3.5})
-    less = replace(r.regions[0].candidates[0], lowest=(-0.15,))
-    of = replace(r.regions[0], candidates=(less, *r.regions[0].candidates[1:]))
-    for kind in (Linear, Held):
-        _, _, p = searched(kind(**{**vars(r), "regions": (of,)}))
-        assert {c.name: x[0] for c, x in p.best.hypothesis.sizes()} == pytest.approx({"coulomb_friction": -3.5}, rel=0.05)
-        assert p.named["coulomb_friction", ("j",)] > 0.9
+    both = replace(r.regions[0].candidates[0], lowest=(-0.15,)).one_way()
+    assert [c.less for c in both] == [False, True]
+    of = replace(r.regions[0], candidates=(*both, *r.regions[0].candidates[1:]))
+    _, _, p = searched(Held(**{**vars(r), "regions": (of,)}))
+    ((c, x),) = p.best.hypothesis.sizes()
+    assert c.values(x) == pytest.approx([-3.5 * 0.03], rel=0.05)
+    assert p.named["coulomb_friction", ("j",)] > 0.9
 
 
 class Coarse(Linear):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -26,7 +26,8 @@ class Candidate:
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
     that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
     numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the formats page's
-    units, by number; empty: they are not told. lowest: `Effect.lowest` of all the effect's parameters; empty: `Parameter.low`."""
+    units, by number; empty: they are not told. lowest: `Effect.lowest` of all the effect's parameters; empty: `Parameter.low`.
+    less: whether it only takes from a constant; its size is 1 where a typical amount is gone."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -37,6 +38,7 @@ class Candidate:
     options: tuple[str, ...] = ()
     spread: tuple[float, ...] = ()
     lowest: tuple[float, ...] = ()
+    less: bool = False
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
@@ -92,6 +94,24 @@ class Candidate:
         return np.array([x for x, fixed in zip(far, self.fixed) if not fixed], dtype=bool)
 
     @property
+    def most(self) -> list[float]:
+        """The largest possible value of each number, in the units of docs/formats.md."""
+        return [n if self.less and p.adds_to else p.high for p, n in zip(self.parameters, self.neutral)]
+
+    def one_way(self) -> list[Candidate]:
+        """The candidate as it adds to a constant and, where that is possible, as it takes from it: two hypotheses with sizes of
+        one sign each."""
+        more = replace(self, lowest=())
+        typical = tuple(2 * n - t if p.adds_to else t for p, n, t in zip(self.parameters, self.neutral, self.typical))
+        return [more, replace(self, typical=typical, less=True)] if self.takes_away.any() else [more]
+
+    def with_options(self, options: Iterable[str]) -> Candidate:
+        """The same with these options; initially the numbers that make the effect are zero, those that shape it are typical."""
+        neutral = tuple(p.typical if p.shapes else 0.0 for p in self.effect.parameters)
+        c = Candidate.of(self.effect, self.where, neutral, options=tuple(sorted({*options})), lowest=self.lowest)
+        return c.one_way()[-1] if self.less else c
+
+    @property
     def size(self) -> int:
         """How many numbers are fitted."""
         return self.fixed.count(False)
@@ -118,7 +138,8 @@ class Candidate:
         """Parameters in the units of docs/formats.md, limited to their bounds; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
-        for p, low, n, t, fixed in zip(self.parameters, self.least, self.neutral, self.typical, self.fixed):
+        ends = zip(self.least, self.most)
+        for p, (low, high), n, t, fixed in zip(self.parameters, ends, self.neutral, self.typical, self.fixed):
             size = 1.0 if fixed else next(sizes)
             if fixed:
                 value = t
@@ -126,7 +147,7 @@ class Candidate:
                 value = t / max(size, t / p.high)
             else:
                 value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
-            out.append(float(np.clip(value, low, p.high)))
+            out.append(float(np.clip(value, low, high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:
@@ -138,7 +159,8 @@ class Candidate:
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of the sizes x, lower and upper."""
         low, high = [], []
-        for p, least, n, t, fixed in zip(self.parameters, self.least, self.neutral, self.typical, self.fixed):
+        limits = zip(self.least, self.most)
+        for p, (least, most), n, t, fixed in zip(self.parameters, limits, self.neutral, self.typical, self.fixed):
             if fixed:
                 continue
             if math.isinf(n):
@@ -148,7 +170,7 @@ class Candidate:
             else:
                 near, far = (n * math.exp(-self.reach), n * math.exp(min(self.reach, 100.0))) if p.logarithmic else (
                     n - self.reach, n + self.reach)
-                ends = [_size(p, end, n, t) for end in (max(least, near), min(p.high, far))]
+                ends = [_size(p, end, n, t) for end in (max(least, near), min(most, far))]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)

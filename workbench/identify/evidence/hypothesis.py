@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammaln, stdtr
+from scipy.special import gammaln
 from scipy.stats import t as student_t
 
 from workbench.effects.base import Effect
@@ -147,14 +147,14 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Prior:
-    """Prior of a hypothesis' parameters: normal for recalibrated constants and doublings, Student's t for sizes, the part of it
-    above their lower bound, with degrees of freedom and width such that one in a hundred exceeds the effect's `seldom_beyond`;
-    else Cauchy's. center (k,), scale (k,); normal (k,); lowest (k,): the bound, -infinity where it cuts nothing; freedom (k,)."""
+    """Prior of a hypothesis' parameters: normal for recalibrated constants and doublings, Student's t for sizes, half of it where
+    they have one sign, with degrees of freedom and width such that one in a hundred exceeds the effect's `seldom_beyond`; else
+    Cauchy's. center (k,), scale (k,); normal, one_sided (k,); freedom (k,)."""
 
     center: Array
     scale: Array
     normal: Mask
-    lowest: Array
+    one_sided: Mask
     freedom: Array
 
     @classmethod
@@ -174,11 +174,11 @@ class Prior:
         v = self.freedom
         return float(np.sum(self.at_center - np.where(self.normal, 0.5 * z * z, (v + 1) / 2 * np.log1p(z * z / v))))
 
-    @cached_property
+    @property
     def at_center(self) -> Array:
         """Log density of each number (k,) where it is largest [nats]."""
-        v, below = self.freedom, stdtr(self.freedom, (self.lowest - self.center) / self.scale)
-        student = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * v) - np.log1p(-below)
+        v = self.freedom
+        student = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * v) + np.log(2.0) * self.one_sided
         return np.asarray(np.where(self.normal, -0.5 * np.log(2 * np.pi), student) - np.log(self.scale))
 
     def precision(self, theta: Array) -> Array:
@@ -201,9 +201,10 @@ def start(numbers: Sequence[Uncertain]) -> Hypothesis:
 
 @lru_cache(maxsize=1024)
 def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> Prior:
-    center, scale, normal, lowest = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.full(n, -np.inf)]
+    center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
     freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
     for c in effects:
+        low, high = c.bounds()
         shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
         has_usual = np.isfinite(seldom)
         center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
@@ -211,5 +212,5 @@ def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> 
         scale.append(np.where(shapes, options.doublings, width))
         freedom.append(np.where(has_usual, options.freedom, 1.0))
         normal.append(shapes)
-        lowest.append(np.where(shapes | c.read_off, -np.inf, np.minimum(c.bounds()[0], 0.0)))
-    return Prior(*(np.concatenate(x) for x in (center, scale, normal, lowest, freedom)))
+        one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
+    return Prior(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))

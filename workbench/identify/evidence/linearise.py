@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
 
@@ -53,14 +53,8 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
            if (c.name, c.where) not in there and (c.effect.tied is None or c.effect.tied not in ties)]
     for c in h.effects:
         more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
-        out += [_with_options(c, (*c.options, name)) for name in more]
+        out += [c.with_options((*c.options, name)) for name in more]
     return out
-
-
-def _with_options(c: Candidate, options: Iterable[str]) -> Candidate:
-    """A candidate with these options; initially the numbers that make the effect are zero, those that shape it are typical."""
-    neutral = tuple(p.typical if p.shapes else 0.0 for p in c.effect.parameters)
-    return Candidate.of(c.effect, c.where, neutral, options=tuple(sorted({*options})), lowest=c.lowest)
 
 
 def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
@@ -83,7 +77,7 @@ def ways(probes: Sequence[Probe]) -> list[list[Probe]]:
     out: dict[object, list[Probe]] = {}
     for p in probes:
         shape = tuple(np.delete(p.x, p.moved).round(6)) if p.moved >= 0 else ()
-        out.setdefault((p.candidate.key, p.candidate.options, p.moved, shape), []).append(p)
+        out.setdefault((p.candidate, p.moved, shape), []).append(p)
     return list(out.values())
 
 
@@ -122,7 +116,7 @@ def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move)
     """Two moves at once: the responses are added, and the parameters of the fit are re-optimised linearly."""
     (one,), (two,) = a.added, b.added
     if one.key == two.key:  # two options of one effect that is there
-        two = _with_options(two, (*one.options, *two.options))
+        two = two.with_options((*one.options, *two.options))
     sizes = {**dict(zip(b.hypothesis.labels, b.hypothesis.theta)), **dict(zip(a.hypothesis.labels, a.hypothesis.theta))}
     sizes |= {label: x for label, x in zip(b.hypothesis.labels, b.hypothesis.theta) if label not in f.hypothesis.labels}
     h = a.hypothesis.with_effect(two, np.array([sizes[label] for label in labels_of(two)]))
@@ -158,37 +152,30 @@ def points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
     shapes = SHAPES if (c.shapes & new).any() else (0.0,)
     amounts = ENDLESS if any(np.isinf(n) for n in c.neutral) else AMOUNTS
     out: list[tuple[Array, int]] = []
-    less = (-amounts[-1],)  # or all of a constant: a joint that is held by its friction does not respond to more of it
-    for k, d in product(np.flatnonzero(new & ~c.shapes), shapes):
-        for amount in (*amounts, *less) if c.takes_away[k] else amounts:
-            x = start + d * (c.shapes & new)
-            x[k] = amount
-            x = np.clip(x, low, high)
-            if not any(np.allclose(x, other) for other, _ in out):
-                out.append((x, int(k)))
+    for k, d, amount in product(np.flatnonzero(new & ~c.shapes), shapes, amounts):
+        x = start + d * (c.shapes & new)
+        x[k] = amount
+        x = np.clip(x, low, high)
+        if not any(np.allclose(x, other) for other, _ in out):
+            out.append((x, int(k)))
     return out
 
 
 def on_lines(none: Array, along: Sequence[Probe]) -> list[tuple[Array, Array]]:
     """Sizes along one direction of a candidate and the predicted residuals of each: linear interpolation between the simulated
-    ones, starting at none, and extrapolation beyond the last and to the other side, if none was simulated there. none (n,):
-    residuals without it."""
+    ones, starting at none, and extrapolation beyond the last and to the other side. none (n,): residuals without it."""
     k = along[0].moved
     if k < 0:
         return [(p.x, p.r) for p in along]
     low, high = along[0].candidate.bounds()
     seen = sorted(along, key=lambda p: abs(p.x[k]))
-    forth, back = ([(0.0, none), *((float(p.x[k]), p.r) for p in seen if way * p.x[k] > 0)] for way in (1, -1))
-    read: list[tuple[float, Array]] = []
-    for knots in (forth, back):
-        read += knots[1:]
-        for (a, ra), (b, rb) in pairwise(knots):
-            read += [(a + share * (b - a), ra + share * (rb - ra)) for share in BETWEEN]
-        if len(knots) > 1:
-            (a, ra), (b, rb) = knots[-2:]
-            read += [(b + share * (b - a), rb + share * (rb - ra)) for share in BEYOND]
-    if len(back) == 1:
-        read += [(-share * forth[1][0], none - share * (forth[1][1] - none)) for share in (*BETWEEN, *BEYOND)]
+    knots = [(0.0, none), *((float(p.x[k]), p.r) for p in seen)]
+    read = [*knots[1:]]
+    for (a, ra), (b, rb) in pairwise(knots):
+        read += [(a + share * (b - a), ra + share * (rb - ra)) for share in BETWEEN]
+    (a, ra), (b, rb) = knots[-2:]
+    read += [(b + share * (b - a), rb + share * (rb - ra)) for share in BEYOND]
+    read += [(-share * knots[1][0], none - share * (knots[1][1] - none)) for share in (*BETWEEN, *BEYOND)]
     out = []
     for amount, r in read:
         if low[k] <= amount <= high[k]:

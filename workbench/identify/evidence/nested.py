@@ -36,7 +36,8 @@ def improbable_effects(region: Region, options: EvidenceOptions, best: Fitted) -
             continue
         x, V = fit.hypothesis.theta[made], covariance[np.ix_(made, made)]
         posterior = -0.5 * float(x @ np.linalg.solve(V, x)) - 0.5 * float(np.linalg.slogdet(2 * np.pi * V)[1])
-        posterior -= float(np.sum(log_ndtr((x - prior.lowest[made]) / np.sqrt(np.diag(V)))))  # which ends at its lower bound
+        sign = prior.one_sided[made]  # of these the posterior ends at 0
+        posterior -= float(np.sum(log_ndtr(np.abs(x) / np.sqrt(np.diag(V)))[sign]))
         before = float(np.sum(prior.at_center[made]))
         odds = before - posterior + (1 + len(c.options)) * log_odds(len(region.candidates), options.expected)
         if odds < 0:
