@@ -8,7 +8,6 @@ deviation.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,6 @@ from workbench.identify.evidence.fit import Asks, Fitted, regress
 from workbench.identify.evidence.hypothesis import Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.results.reasons import LessLikely, Reason
-from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.region import Region
@@ -30,7 +28,6 @@ def improbable_effects(region: Region, options: EvidenceOptions, best: Fitted) -
     if not best.hypothesis.effects:
         return {}
     fit = yield from regress(region, options, best)
-    fit = replace(fit, J=_recalibrated_instead(fit))
     covariance, prior = fit.covariance(region, options), Prior.of(fit.hypothesis, options)
     out: dict[Candidate, Reason] = {}
     for c, own in zip(fit.hypothesis.effects, fit.hypothesis.slices()):
@@ -46,17 +43,3 @@ def improbable_effects(region: Region, options: EvidenceOptions, best: Fitted) -
         if odds < 0:
             out[c] = LessLikely(-odds)
     return out
-
-
-def _recalibrated_instead(fit: Fitted) -> Array:
-    """The slopes of a fit (n, k). Where an effect takes from a constant that could also be recalibrated, the slope of the latter
-    is the mean one as far down as that: it is proportional to the constant, and far less near nothing than at the fit."""
-    h, J = fit.hypothesis, fit.J.copy()
-    at = {s.start: c for c, s in zip(h.effects, h.slices())}
-    for k, i in h.alike():
-        c, sd, z, x = at[i], h.numbers[k].sd, h.theta[k], h.theta[i]
-        if not (c.less and x > 0):
-            continue
-        left = np.exp(sd * z) + c.values([x])[0] / -c.least[0]
-        J[:, k] = J[:, i] * x / (np.log(left) / sd - z) if left > 0 else 0.0
-    return np.asarray(J)
