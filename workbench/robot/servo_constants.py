@@ -226,6 +226,11 @@ STRONGEST = 75.0
 _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
 
 
+def largest(key: str) -> float:
+    """The largest value of a constant that servo.yaml may state, in its unit."""
+    return _BOUNDS.get(key, (math.inf, ""))[0]
+
+
 def load_servo_constants(path: str | Path) -> ServoConstants:
     """Reads `servo.yaml`; InputError names the file and the key."""
     return servo_constants(read_yaml(path), Path(path))
