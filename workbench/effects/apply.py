@@ -68,14 +68,16 @@ def resolve(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, f
 
 def add_possible(model: RobotModel, specs: Sequence[EffectSpec]) -> RobotModel:
     """The model with more effects, none of which takes away more of a constant than is there: a search changes both at once."""
+    effects = list(model.effects)
     for spec in specs:
         effect = effect_named(spec.effect)
         if _takes_away(effect, spec):
-            least = {p.name: low for p, low in zip(effect.parameters, effect.lowest(model, spec.where))}
+            lowest = effect.lowest(model.with_effects(effects), spec.where)
+            least = {p.name: low for p, low in zip(effect.parameters, lowest)}
             spec = replace(spec, parameters={
                 name: v if isinstance(v, tuple) else max(v, least[name]) for name, v in spec.parameters.items()})
-        model = model.with_effects((*model.effects, spec))
-    return model
+        effects.append(spec)
+    return model.with_effects(effects)
 
 
 def _takes_away(effect: Effect, spec: EffectSpec) -> bool:
