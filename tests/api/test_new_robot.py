@@ -66,3 +66,20 @@ def test_what_cannot_be_written_is_one_line(leg: Path, capsys: pytest.CaptureFix
     assert "left for you" in capsys.readouterr().out
     assert main(["new-robot", str(leg / "leg.urdf"), "--servo", "LX-16A", "--out", str(leg)]) == 2
     assert "already there" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (None, "file not found"), ("a poem", "not a recording"), (joint_log(*swing(), joint="wing"), "unknown joint 'wing'")])
+def test_a_take_that_no_verb_could_use_is_refused(leg: Path, text: str | None, said: str) -> None:
+    if text is not None:
+        (leg / "other.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        new_robot(leg / "leg.urdf", "LX-16A", leg / "own", [leg / "take.csv", leg / "other.csv"], "fixed")
+    assert not (leg / "own").exists()
+
+
+def test_takes_of_one_name_are_told_apart(leg: Path) -> None:
+    (leg / "second").mkdir()
+    (leg / "second/take.csv").write_text((leg / "take.csv").read_text())
+    new_robot(leg / "leg.urdf", "LX-16A", leg / "own", [leg / "take.csv", leg / "second/take.csv"], "fixed")
+    assert [t.name for t in load_session(leg / "own").takes] == ["take", "take_2"]

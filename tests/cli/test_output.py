@@ -76,3 +76,26 @@ def _fail(out: Path, error: BaseException) -> None:
     with output_directory(out) as folder:
         (folder / "x.csv").write_text("half")
         raise error
+
+
+@pytest.mark.parametrize(("made", "said"), [
+    (lambda out: (out / "b.txt").mkdir(parents=True), "b.txt: cannot be written (a folder has this name)"),
+    (lambda out: (out.mkdir(), (out / "sub").write_text("x")), "is a file)")])
+def test_nothing_appears_where_one_name_is_taken(tmp_path, made, said):
+    out = tmp_path / "out"
+    made(out)
+    before = sorted(out.rglob("*"))
+    with pytest.raises(InputError) as caught, output_directory(out) as folder:
+        (folder / "a.txt").write_text("a")
+        (folder / "b.txt").write_text("b")
+        (folder / "sub").mkdir()
+        (folder / "sub/c.txt").write_text("c")
+    assert said in str(caught.value)
+    assert sorted(out.rglob("*")) == before
+    assert not list(tmp_path.glob(".workbench-*"))
+
+
+def test_a_block_that_writes_nothing_makes_no_folder(tmp_path):
+    with output_directory(tmp_path / "out"):
+        pass
+    assert not (tmp_path / "out").exists()

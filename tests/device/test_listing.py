@@ -6,6 +6,7 @@ from tests.command import succeeds
 from tests.device.servos import FAMILIES, arm, robot
 from workbench.device.bus import BusError
 from workbench.device.bus.listing import list_servos
+from workbench.device.bus.survey import survey
 from workbench.device.virtual import VirtualServo
 
 
@@ -31,6 +32,15 @@ def test_two_families_on_one_bus_and_a_stranger(tmp_path):
     assert {name: sorted(found.found) for name, found in by_name.items()} == {"AX-12A": [40, 41], "XL-330": [1, 2, 3]}
     assert by_name["AX-12A"].found[41].model == "unknown model 24"
     assert any("servo 41: is unknown model 24 (24)" in line for line in by_name["AX-12A"].problems())
+
+
+@pytest.mark.parametrize(("family", "highest"), [("AX-12A", 253), ("STS3215", 253), ("XL-330", 252)])
+def test_every_id_that_the_protocol_allows_is_asked(tmp_path, family, highest):
+    r = robot(family, model=arm(tmp_path))
+    VirtualServo(r.wire, FAMILIES[family][0], highest, r.body)
+    (found,) = list_servos(r.port)
+    assert sorted(found.found) == [1, 2, 3, highest]
+    assert sorted(survey(r.bus(), None).found) == [1, 2, 3, highest]
 
 
 def test_another_bit_rate_is_found_and_slow_answers_are_waited_for(tmp_path):

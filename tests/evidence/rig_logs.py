@@ -21,10 +21,11 @@ GAINS = (0.3, 0.6, 1.2)
 NOISE = 1.5e-3
 
 
-def record(folder: Path, effects: Sequence[EffectSpec] = (), seed: int = 0, beside: float = 0.0,
+def record(folder: Path, effects: Sequence[EffectSpec] = (), seed: int = 0, beside: float = 0.0, faster: float = 1.0,
            told: Mapping[str, float] | None = None, **servo: float) -> Session:
     """A session of three logs of 3 s, one a gain, of a rig with other physics than its servo.yaml says. beside: RMS [rad] of what
-    lies on top, smooth and no physics. told: constants of servo.yaml that differ from SERVO."""
+    lies on top, smooth and no physics. faster: by which the goals move faster than usual. told: constants of servo.yaml that
+    differ from SERVO."""
     (folder / "rig.sdf").write_text(SDF.format(length=0.1, mass=0.5))
     (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO | dict(told or {})))
     takes = [{"name": f"gain {g:g}", "recording": f"{g:g}.csv", "base": "fixed", "servos": {"proportional_gain": g}}
@@ -32,7 +33,7 @@ def record(folder: Path, effects: Sequence[EffectSpec] = (), seed: int = 0, besi
     (folder / "session.yaml").write_text(yaml.safe_dump(
         {"format": 1, "robot": {"model": "rig.sdf", "base": "base", "servos": "servo.yaml"}, "takes": takes}))
     time = np.arange(0.0, 3.0, 0.01)
-    goal = 1.1 * np.sin(2.2 * time) + 0.5 * np.sin(7.0 * time + 1.0)
+    goal = 1.1 * np.sin(2.2 * faster * time) + 0.5 * np.sin(7.0 * faster * time + 1.0)
     for g in GAINS:  # so that the session can be read
         write_joint_log(folder / f"{g:g}.csv", time, {"goal.j": goal, "position.j": 0 * goal})
     model = load_session(folder).model

@@ -1,5 +1,6 @@
 """Certificates: bound to their table and robot, and asked for by export."""
 
+import hashlib
 import json
 import math
 from dataclasses import replace
@@ -12,7 +13,7 @@ from workbench.cli.check import check_table_of
 from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
-from workbench.gait.certify import CertifyOptions, certify
+from workbench.gait.certify import CertifyOptions, Examination, certify
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
@@ -54,6 +55,55 @@ def _again(model, commands, seconds):
     from workbench.simulation import Job, SimulationConfig, simulate_batch
 
     return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
+
+
+def test_what_the_robots_refuse_is_known_before_the_rest_is_simulated(made, monkeypatch, tmp_path):
+    _, machine, table, certified = made
+    request = replace(certified.request, limits=replace(certified.request.limits, tilt=1e-4))
+    draws = load_ensemble().draws(machine.model, 2, 7, tmp_path)
+    examination = Examination(machine, request, table, draws, replace(OPTIONS, watched=0, trimmed=0), lambda what, done: None, {})
+    with monkeypatch.context() as m:
+        m.setattr(Examiner, "variant", lambda *_: pytest.fail("simulated although the robots refuse the gait"))
+        assert examination.refusal is not None
+        assert examination.refusal.name.startswith("tilt")
+    rest = examination.finish().certificate
+    assert not rest.kept
+    assert examination.refusal in rest.margins
+    assert [m.name for m in rest.margins if m.name not in ("speed of the worse half of draws",)] == [
+        m.name for m in certified.certificate.margins if m.name not in ("way back to its cycle", "drift after 3 recorded metres")
+        and "engine" not in m.name and "itself" not in m.name]
+
+
+@pytest.mark.parametrize("text", [
+    "", "[]", "[1, 2]", "7", "null", "true", '"certificate"', "{}", '{"format": 2}', '{"format": 1}',
+    '{"format": 1, "sha256": []}', "[" * 4000, '{"format": 1' + "0" * 40 + "}", '{"format": NaN}', "{'format': 1}"])
+def test_what_is_no_certificate_is_refused_in_plain_words(tmp_path, text):
+    (tmp_path / NAME).write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_certificate(tmp_path / NAME)
+    assert str(caught.value).startswith(str(tmp_path / NAME))
+    assert "Error" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [[], [3], 3, "three", None, {}, {"a": 1}, [{"a": 1}]])
+def test_a_field_of_another_type_is_named(made, tmp_path, value):
+    """Even where the digest is right, as of a file that another program wrote."""
+    content = made[3].certificate.to_json()
+    for name in ("kept", "request", "tables", "margins", "nominal", "draws", "ways", "cycle", "shape", "provenance"):
+        if isinstance(value, dict) and isinstance(content[name], dict) and name not in ("nominal", "ways", "cycle"):
+            continue
+        if (name, value) in (("request", "three"), ("cycle", {})):
+            continue
+        (tmp_path / NAME).write_text(json.dumps(_digested({**content, name: value})))
+        with pytest.raises(InputError, match=f"{name} has other content") as caught:
+            read_certificate(tmp_path / NAME)
+        assert "Error" not in str(caught.value)
+
+
+def _digested(content):
+    rest = {k: v for k, v in content.items() if k != "sha256"}
+    return {**rest, "sha256": hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()}
 
 
 def test_says_what_there_is_to_say(made):

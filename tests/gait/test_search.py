@@ -225,7 +225,9 @@ def test_less_friction_than_nominal_is_drawn_down_to_none(machine, tmp_path):
 @pytest.mark.parametrize(("text", "said"), [
     ("format: 2", "format: expected 1"), ("format: 1\nfriction: {low: 0.5}", "friction.high: is missing"),
     ("format: 1\nfriction: {low: 0.5, high: 0.1}", "friction.high: expected at least 0.5"),
-    ("format: 1\nwind: 3", "wind: unknown key"), ("format: 1\nlink_mass: {share: 2}", "link_mass.share: expected less than 1")])
+    ("format: 1\nwind: 3", "wind: unknown key"),
+    ("format: 1\nlink_mass: {share: 2}", "link_mass.share: expected a number of at least 0 and at most 0.9"),
+    ("format: 1\npayload: {mass: 100}", "payload.mass: expected a number of at least 0 and at most 5, got 100")])
 def test_a_bad_ensemble_file_is_one_line(tmp_path, text, said):
     path = tmp_path / "e.yaml"
     path.write_text(text)

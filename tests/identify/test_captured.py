@@ -78,7 +78,7 @@ def test_threads_fill_in_for_what_is_drakes_alone(take: TakeEvidence, monkeypatc
     models = [puppy_model().with_effects(EFFECTS[name]) for name in ("nothing", "friction", "payload")]
     whole = evaluator.residuals([RolloutRequest(m, (0,)) for m in models])
     covered = captured.compiled_for
-    monkeypatch.setattr(captured, "compiled_for", lambda r: None if r.model is models[1] else covered(r))
+    monkeypatch.setattr(captured, "compiled_for", lambda r, made: None if r.model is models[1] else covered(r, made))
     mixed = RolloutEvaluator([take], CONFIG, n_jobs=2).residuals([RolloutRequest(m, (0,)) for m in models])
     for one, other in zip(whole, mixed):
         assert np.allclose(one[0], other[0], atol=1e-6, equal_nan=True)

@@ -103,6 +103,18 @@ def test_a_servos_law_is_read_from_its_register_over_logs_of_several_gains():
     assert law_of([]) is None
 
 
+def test_goals_stamped_by_another_clock_are_told_from_late_ones():
+    logs = []
+    for seed, gain in enumerate((1.3, 2.6, 2.6)):
+        t, goal, position, duty = servo_log(gain, seed)
+        logs.append(RegisterLog(t, np.interp(1.01 * t, t, goal), position, duty, np.ones(len(t), dtype=bool), gain))
+    law = law_of(logs)
+    assert law is not None
+    assert law.rate == pytest.approx(1.01, abs=1e-3)
+    assert law.delay == pytest.approx(0.018, abs=2e-3)
+    assert law.gain == pytest.approx(1.0, rel=0.02)
+
+
 def test_a_goal_ramps_on_its_way_and_stands_where_it_has_come():
     sent, goal = np.array([0.0, 1.0, 1.5]), np.array([0.0, 1.0, 0.8])
     np.testing.assert_allclose(ramp_goals(sent, goal, np.array([0.5, 1.2, 1.4, 1.6, 3.0]), 1.0), [0.0, 0.2, 0.4, 0.6, 0.8])

@@ -85,7 +85,7 @@ def test_another_drake_project_simulates_it_in_one_line(tmp_path: Path) -> None:
     ("base: trunk", "base: tronk", "robot.base: the model has no link 'tronk'"),
     ("stall_torque: 1.5", "stall_torque: -1", "servos: stall_torque: expected a positive number"),
     ("punch: 32", "punsh: 32", "servos: unknown key 'punsh'"),
-    ("friction: 0.6", "friction: -1", "ground.friction: expected a number of at least 0"),
+    ("friction: 0.6", "friction: -1", "ground.friction: expected a non-negative number"),
     ("effects:", "colour: red\neffects:", "colour: unknown key"),
     ("posterior:", "posterior:\n  scale: 1", "posterior.scale: unknown key"),
     ("backlash(two).gap", "backlash(one).gap", "posterior.names: expected those of the effects"),

@@ -101,6 +101,14 @@ def of_several_kinds(arm: RobotModel) -> list[RobotModel]:
         [("thermal_fade", {"rate": 0.2})]))]
 
 
+def test_robots_with_links_of_other_lengths_play_together(arm, calls):
+    """Drake parses each, but their trees have the same branches."""
+    link = arm.kinematics.frames[arm.joints[1]].child
+    models = [arm, *(arm.with_effect(EffectSpec("link_length", (link,), {"change": change})) for change in (-0.02, 0.01, 0.02))]
+    assert largest_difference(jobs_of(models, swings(arm))) < SAME
+    assert calls.lanes == 2  # settling, and the run
+
+
 @pytest.mark.parametrize("enabled", [True, False], ids=["on", "one servo off"])
 def test_robots_with_other_effects_play_in_lanes_as_each_does_alone(arm, calls, enabled):
     models = of_several_kinds(arm)

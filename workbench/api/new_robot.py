@@ -16,6 +16,8 @@ from workbench.files import InputError
 from workbench.files.reading import write_together
 from workbench.files.resources import resource_dir
 from workbench.files.yaml_file import read_yaml
+from workbench.recording.formats.read import read_recording, recording_of_take
+from workbench.recording.take_from import named_by_model
 from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile, servo_profiles
 
@@ -53,8 +55,8 @@ def new_robot(description: str | Path, servo: str, out: str | Path, takes: Seque
     """Writes session.yaml and servo.yaml into `out` for a robot described by an SDF or URDF.
 
     servo: its type, one of `known_servos`. takes: recordings of it. base: whether the robot was free or fixed in them; None:
-    as the description says. packages: as of RobotModel. InputError where the description cannot be read, the servo is unknown,
-    or one of the files is already there.
+    as the description says. packages: as of RobotModel. InputError where the description or a take cannot be read, a take is
+    another robot's, the servo is unknown, or one of the files is already there.
     """
     out = Path(out)
     for name in ("session.yaml", "servo.yaml"):
@@ -65,6 +67,7 @@ def new_robot(description: str | Path, servo: str, out: str | Path, takes: Seque
     if not k.joints:
         raise InputError(description, "no joint that turns; expected a robot with servos")
     values, source, travel = _constants(servo)
+    _check_takes(takes, model)
     held = base == "fixed" or (base is None and k.fixed_to_world)
     guessed = [f"base link: {k.root}{' (fixed to the world)' if k.fixed_to_world else ''}",
                f"joints: {', '.join(k.joints)}", f"servo.yaml: {servo}, {source}"]
@@ -80,6 +83,14 @@ def new_robot(description: str | Path, servo: str, out: str | Path, takes: Seque
     session = _session(description, out, k.root, feet, takes, held, packages or {}, k.joints)
     paths = write_together(out, {"session.yaml": session, "servo.yaml": _servo_yaml(servo, source, values)})
     return NewRobot(tuple(paths), tuple(guessed), tuple(missing))
+
+
+def _check_takes(takes: Sequence[str | Path], model: RobotModel) -> None:
+    """InputError for a take that is missing or no recording, or a log of joints that the robot does not have."""
+    for path in takes:
+        recording = read_recording(recording_of_take(Path(path), Path(path).stem))
+        if recording.sensing == "encoders":
+            named_by_model(recording, model)
 
 
 def _constants(servo: str) -> tuple[dict[str, Any], str, float]:
@@ -151,8 +162,10 @@ def _session(description: str | Path, out: Path, root: str, feet: Sequence[str],
     base = "fixed" if held else "free"
     if takes:
         lines.append("takes:")
-        for path in takes:
-            lines += [f"- name: {_quote(Path(path).stem)}", f"  recording: {_quote(_relative(path, out))}", f"  base: {base}"]
+        stems = [Path(path).stem for path in takes]
+        for k, path in enumerate(takes):
+            name = stems[k] if stems.index(stems[k]) == k else f"{stems[k]}_{k + 1}"
+            lines += [f"- name: {_quote(name)}", f"  recording: {_quote(_relative(path, out))}", f"  base: {base}"]
     else:
         lines += ["# list your recordings here, for instance", "# takes:", "# - name: slow", "#   recording: takes/slow.csv",
                   f"#   base: {base}          # fixed: on a stand or a table; free: it walks"]

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from workbench.simulation.virtual_robot import VirtualRobot
 
 VIRTUAL = "virtual"
+SLOWEST, FASTEST = 1200, 10_500_000
+"""Bit rates of any servo's bus: hobby servos have from 9600 on, DYNAMIXEL Pro and Y up to 10.5 million [bit/s]."""
 
 
 def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -23,7 +25,7 @@ def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None
     default_port = default or "the only USB adapter"
     parser.add_argument("--port", metavar="PORT", default=default,
                         help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {default_port})")
-    parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S",
+    parser.add_argument("--rate", type=_bit_rate, default=1_000_000, metavar="BIT/S",
                         help="baud rate of the servo bus (default: 1000000)")
     parser.add_argument("--echo", action="store_true", help="the adapter echoes its own transmissions")
     parser.add_argument("--bridge", action="store_true", help="the port is the PC link of a CM-530 with the workbench's program")
@@ -32,6 +34,16 @@ def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None
                              "with effects (default: the model)")
     parser.add_argument("--base", choices=("free", "fixed"), default="free",
                         help="free: standing on its feet; fixed: held (default: free)")
+
+
+def _bit_rate(text: str) -> int:
+    """A rate that serial adapters have, for argparse."""
+    from workbench.files.numerals import whole_of
+
+    value = whole_of(text)
+    if value is None or not SLOWEST <= value <= FASTEST:
+        raise argparse.ArgumentTypeError(f"expected a whole number from {SLOWEST} to {FASTEST} bit/s, got {text[:40]}")
+    return value
 
 
 def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | None:
@@ -114,9 +126,13 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
     if find_spec("unicorn") is None:
         raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     image = read_bytes(args.image)
-    from workbench.device.virtual.cm530 import Board
+    from workbench.device.virtual.cm530 import Board, BoardError, check_image
     from workbench.device.virtual.cm530.port import PcLinkPort
 
-    board = Board(image, virtual.clock, virtual.bus)
-    board.power_on()
-    yield PcLinkPort(board)
+    try:
+        check_image(image)
+        board = Board(image, virtual.clock, virtual.bus)
+        board.power_on()
+        yield PcLinkPort(board)
+    except BoardError as e:
+        raise InputError(args.image, f"not a program that the CM-530 runs: {e}") from None

@@ -62,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Searches, certifies, writes, and prints the result."""
-    from workbench.cli.output import output_directory
+    from workbench.cli.output import memory_folder, output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
     from workbench.gait.ensemble import load_ensemble
@@ -77,8 +77,7 @@ def run(args: argparse.Namespace) -> int:
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
     request = _request(args, model)
     options = _options(args, model, request)
-    with output_directory(args.out) as folder, Progress("optimize") as progress:
-        args.out.mkdir(parents=True, exist_ok=True)
+    with output_directory(args.out) as folder, memory_folder(args.out), Progress("optimize") as progress:
         result = optimize(machine, request, ensemble, options, progress, args.out / MEMORY, other_engine())
         if result.table is not None and result.certified is not None:
             progress("drawing")

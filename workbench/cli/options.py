@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 PUPPY = "package://puppy/puppy.sdf"
 MOST = 10_000
 """Largest number of cycles, processes and the like: more is a mistake, not a wish."""
-SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
-"""Bounds of the simulation's time step [s]: a walk of 10 s takes a million of the shortest, and feet sink in with the longest."""
 
 
 def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy", unless: str | None = PUPPY) -> None:
@@ -54,7 +52,7 @@ def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
 
 def _folder(text: str) -> Path:
     """A folder's path, for argparse; refuses an empty one, which is an unset shell variable rather than the current folder."""
-    if not text:
+    if not text or "\0" in text:
         raise argparse.ArgumentTypeError("expected a folder")
     return Path(text)
 
@@ -99,9 +97,11 @@ def seconds(text: str) -> float:
 def time_step(text: str) -> float:
     """A step of the simulation [s], for argparse: with longer ones contact and servos are meaningless, with shorter ones the
     simulation never ends."""
+    from workbench.physical import TIME_STEP
+
     value = seconds(text)
-    if not SHORTEST_STEP <= value <= LONGEST_STEP:
-        raise argparse.ArgumentTypeError(f"expected {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, got {text[:40]}")
+    if TIME_STEP.problem(value) is not None:
+        raise argparse.ArgumentTypeError(f"expected {TIME_STEP.least:g} to {TIME_STEP.most:g} s, got {text[:40]}")
     return value
 
 

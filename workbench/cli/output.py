@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from workbench.files import InputError
@@ -22,7 +22,8 @@ LEFT = ".workbench-"
 
 @contextmanager
 def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
-    """A folder to fill, on the same disk as `out`; when the block succeeds its files appear in `out`, complete.
+    """A folder to fill, on the same disk as `out`; when the block succeeds its files, if there are any,
+    appear in `out`, complete.
 
     Whether `out` can be written, and `need` bytes are free there, is checked on entry, before the long work; remains of killed
     runs are deleted. If the block raises, nothing remains. Files that are already in `out` are kept, except those of the
@@ -46,7 +47,8 @@ def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
     try:
         partial.chmod(0o777 & ~_umask())
         yield partial
-        _publish(partial, out)
+        if any(partial.iterdir()):
+            _publish(partial, out)
     except InputError as e:
         if e.source is None or not Path(e.source).is_relative_to(partial):
             raise
@@ -57,6 +59,17 @@ def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
         raise
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+@contextmanager
+def memory_folder(out: Path) -> Iterator[None]:
+    """Makes `out` for the memory of a run that may be killed and continued; removes it where nothing was put into it."""
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # not empty
+            out.rmdir()
 
 
 def _clear(folder: Path) -> None:
@@ -83,8 +96,14 @@ def _publish(partial: Path, out: Path) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         partial.rename(out)
         return
-    for source in sorted(p for p in partial.rglob("*") if not p.is_dir()):
-        target = out / source.relative_to(partial)
+    moves = {p: out / p.relative_to(partial) for p in sorted(partial.rglob("*")) if not p.is_dir()}
+    for target in moves.values():  # all before the first is moved
+        if target.is_dir():
+            raise InputError(target, "cannot be written (a folder has this name)")
+        blocked = next((p for p in target.parents if p.is_relative_to(out) and p.exists() and not p.is_dir()), None)
+        if blocked is not None:
+            raise InputError(target, f"cannot be written ({blocked} is a file)")
+    for source, target in moves.items():
         target.parent.mkdir(parents=True, exist_ok=True)
         source.replace(target)
 

@@ -58,6 +58,10 @@ class FileLimits:
     """A longer take or motion is usually a mistake [s]: simulating it takes hours."""
     slowest_pose: float = 8.0
     """Median time between a motion's poses [s] above which the times are probably milliseconds; no gait or test rests as long."""
+    shortest: float = 0.5
+    """A shorter take tells little [s]: the search compares stretches of this length."""
+    least_seconds: float = 0.1
+    """Of a take that is used [s]: no servo answers a goal in less; a shorter one has times in another unit."""
     fewest_frames: int = 20
     """Of a take."""
     longest_name: int = 100

@@ -110,11 +110,13 @@ def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
 
 
 def readable(path: Path, model: RobotModel) -> Recording:
-    """Reads a recording that can be compared: InputError if it cannot be read, has too few frames, or has neither visible rigid
-    bodies nor joints."""
+    """Reads a recording that can be compared: InputError if it cannot be read, has too few frames, is over in no time, or has
+    neither visible rigid bodies nor joints."""
     recording = read_recording(path)
     if len(recording.time) < FILES.fewest_frames:
         raise InputError(path, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
+    if (seconds := float(np.ptp(recording.time))) < FILES.least_seconds:
+        raise InputError(path, f"lasts {seconds:.3g} s; expected {FILES.least_seconds:g} s or more: are its times in seconds?")
     if recording.channels:
         log = named_by_model(recording, model)
         read = [values for name, values in log.channels.items() if name.startswith("position.")]

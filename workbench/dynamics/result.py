@@ -12,6 +12,7 @@ import numpy as np
 
 from workbench.dynamics.margins import ServoLoad
 from workbench.files import InputError
+from workbench.files.errors import in_words
 from workbench.files.reading import read_text, write_whole
 from workbench.recording.formats.numbers import number_columns
 from workbench.types import Array
@@ -103,7 +104,7 @@ def load_inverse_dynamics(path: str | Path) -> InverseDynamicsResult:
         loads = {joint: ServoLoad(**{k: np.nan if v is None else float(v) for k, v in load.items()})
                  for joint, load in about["loads"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(path, f"line 2: expected a JSON description of the table ({type(e).__name__}: {e})") from None
+        raise InputError(path, f"line 2: expected a JSON description of the table ({in_words(e)})") from None
     table = number_columns(path, lines[3], first_line=4)
     joints = tuple(c.removeprefix("position.") for c in table if c.startswith("position."))
     feet = tuple(dict.fromkeys(c.split(".")[1] for c in table if c.startswith("contact.")))

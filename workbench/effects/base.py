@@ -26,6 +26,8 @@ from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
+    from workbench.recording.servo_log.duty_register import RegisterLaw
+    from workbench.robot import ServoConstants
 
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
@@ -42,8 +44,6 @@ Estimator = Literal["end of travel", "play across the axis", "turn of an asset a
 DEGREE = math.pi / 180
 REACH = 2.0
 """Values beyond this multiple of the 99th percentile (`seldom_beyond`) are implausible."""
-ROUNDING = 1e-9
-"""Share by which a value may be below a bound that was computed in other units."""
 NEAR, BEYOND = 0.08, 0.8
 """NEAR: fraction of the nominal value by which the typical value has to be lower; BEYOND: otherwise, this fraction of the
 nominal value is used instead."""
@@ -60,8 +60,7 @@ class Parameter:
     option: name of the optional part of the effect to which it belongs; empty: it is always given. seldom_beyond: value that one
     in a hundred servos (or robots) with the effect exceeds (for a vector, its length), with the reason in a comment; priors and
     reach follow from it. logarithmic: a ratio whose size is its logarithm, so that 2 and 1/2 are equally large. adds_to: constant
-    of the servo (a number of `ServoConstants`, in SI) to which it is added and which it can at most take away; `low` is then its
-    bound where that constant is zero (`Effect.lowest`).
+    of the servo (number of `ServoConstants`, in SI) to which it is added, and which it can take away (`Effect.lowest`).
     """
 
     name: str
@@ -159,9 +158,8 @@ class Effect:
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def lowest(self, model: RobotModel, where: tuple[str, ...]) -> tuple[float, ...]:
-        """The smallest possible value of each parameter (of a vector's components) at these places of a robot, in the units of
-        docs/formats.md: `Parameter.low`, or as much less as takes away a constant to which it is added, the smallest of several
-        joints. The model's own effects of this name count as part of the constant."""
+        """The smallest possible value of each parameter at these places, in the units of docs/formats.md: `Parameter.low`, less
+        the constant to which it is added, with the model's own effects of this name; the smallest of several joints."""
         own = [e for e in model.effects if e.effect == self.name]
 
         def constant(p: Parameter, joint: str) -> float:
@@ -237,8 +235,11 @@ class Effect:
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the unit of docs/formats.md, estimated from the servos' own registers, and its standard error;
-        None if they do not determine it."""
+        """Its first parameter, in the unit of docs/formats.md, as the servos' registers show it, and its error; None: unknown."""
+        return None
+
+    def in_duty(self, law: RegisterLaw, servo: ServoConstants) -> tuple[float, float] | None:
+        """The same, from the law behind the duty in one joint's logs; the error includes what is unknown of the nominal servo."""
         return None
 
 
@@ -264,7 +265,7 @@ def si_values(effect: Effect, spec: EffectSpec, lowest: Sequence[float] = ()) ->
             wanted = "three numbers" if p.vector else "one number"
             raise InputError(None, f"effect '{spec.effect}': '{p.name}': expected {wanted}")
         for v in value if isinstance(value, tuple) else (value,):
-            if not low - ROUNDING * abs(low) <= v <= p.high:
+            if not low <= v <= p.high and not math.isclose(v, low):  # which was computed in other units
                 raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {v:g} {p.unit}; expected {low:g} to {p.high:g}")
         if isinstance(value, tuple):
             out |= {f"{p.name}.{i}": v * p.si for i, v in enumerate(value)}

@@ -13,12 +13,9 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Registers:
-    """Readings of the servos' own registers in one log, NaN where there are none. duty, nominal_duty: by joint, (N,), duty of the
-    servo's H-bridge, and of the nominal law at the logged error, before it is limited to 1. voltage (N,) [V], None if it was not
-    logged."""
+    """Readings of the servos' registers in one log, NaN where there are none. duty: by joint, (N,); voltage (N,) [V], or None."""
 
     duty: Mapping[str, Array]
-    nominal_duty: Mapping[str, Array]
     voltage: Array | None = None
 
 

@@ -26,6 +26,7 @@ def _check(effect: Effect, at: str) -> tuple[str, Effect]:
     return effect.name, answering_for(effect, at)
 
 
+@cache
 def estimated_by(estimator: Estimator) -> tuple[Effect, ...]:
     """The effects that are estimated directly from the recordings in this way."""
     return tuple(effect for effect in known_effects().values() if effect.estimator == estimator)

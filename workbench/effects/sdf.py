@@ -63,7 +63,8 @@ class SdfRobot:
         return ElementTree.tostring(self.root, encoding="unicode")
 
     def kinematics(self) -> Kinematics:
-        """Kinematics of the robot as changed so far, except for its masses; cached by its changes of joints and lengths."""
+        """Kinematics of the robot as changed so far, except for its masses and the ends of its joints; cached by its changes of
+        joints and lengths."""
         return _kinematics.get(tuple(self._built), lambda: Kinematics.from_text(self.text(), self.path))
 
     def add_play(self, joint: str, gap: float) -> None:
@@ -98,7 +99,6 @@ class SdfRobot:
         set_child(limit, "lower", lower)
         set_child(limit, "upper", upper)
         self.ends = True
-        self._built.append((joint, lower, upper))
 
     def add_parallel_spring(self, joint: str, stiffness: float) -> None:
         """A spring [N m/rad] across the servo's joint, relaxed in neutral, in addition to any spring in the file."""
@@ -206,7 +206,7 @@ class SdfRobot:
         if not before:
             self._keep_apart(joint)
         self.stages[joint] = (*before, name)
-        self._built.append((name, None if xyz is None else ElementTree.tostring(xyz), limits))
+        self._built.append((name, None if xyz is None else ElementTree.tostring(xyz)))
 
     def _keep_apart(self, joint: str) -> None:
         """Excludes collisions of the two links: Drake excludes only neighbours, and these now have a gear between them."""

@@ -100,7 +100,8 @@ class Reach:
 
 def _distance(a: Array, b: Array) -> Array:
     """Least distance (N,) between points (N, M, 3) and (N, L, 3)."""
-    return np.asarray(np.linalg.norm(a[:, :, None] - b[:, None], axis=-1).min(axis=(1, 2)))
+    apart = a[:, :, None] - b[:, None]
+    return np.sqrt(np.einsum("nmli,nmli->nml", apart, apart).min(axis=(1, 2)))
 
 
 def _reachable_speed(model: RobotModel, joint: str) -> float:

@@ -32,3 +32,12 @@ class UnknownFolderError(InputError):
 class MistypedError(InputError):
     """A mistake made by a person (an unknown joint, a word where a number belongs): such a file is refused, not left out as
     damaged."""
+
+
+def in_words(error: Exception) -> str:
+    """Why content has another form than expected, in words for whoever wrote the file, of the error that taking it apart gave."""
+    if isinstance(error, KeyError):
+        return f"'{error.args[0]}' is missing" if error.args else "a key is missing"
+    if isinstance(error, (TypeError, AttributeError, IndexError)):
+        return "a value is of another kind than expected"
+    return " ".join(str(error).split())[:200]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import stat
@@ -72,7 +73,9 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
     except OSError as e:
         raise InputError(path, f"cannot be read ({e.strerror})") from None
     except UnicodeDecodeError as e:
-        raise InputError(path, f"byte {e.start}: not a text file in UTF-8") from None
+        marked = e.object[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        raise InputError(path, "text in UTF-16; save it as UTF-8" if marked else
+                         f"byte {e.start}: not a text file in UTF-8") from None
 
 
 def read_json(path: str | Path) -> Any:

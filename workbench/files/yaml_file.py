@@ -116,7 +116,7 @@ def read_yaml(path: str | Path) -> Any:
     except RecursionError:
         raise InputError(path, f"not valid YAML: nested deeper than {MOST_DEPTH} levels") from None
     except yaml.YAMLError as e:
-        raise InputError(path, f"not valid YAML: {str(e).replace(_UNNAMED, '')}") from None
+        raise InputError(path, f"not valid YAML: {' '.join(str(e).replace(_UNNAMED, '').split()).replace(' , ', ', ')}") from None
 
 
 class Fields:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from workbench.files import InputError
-from workbench.files.reading import read_text
+from workbench.files.reading import read_json, read_text
 from workbench.gait.evaluate import table_sha256
 from workbench.gait.limits import Margin
 from workbench.gait.record import Nominal, Steadiness, Ways, from_plain, to_plain
@@ -30,6 +31,10 @@ ADDED = ("asked",)
 """Fields that the first certificates of format 1 have not."""
 RECORDS: dict[str, type[Any]] = {"nominal": Nominal, "ways": Ways, "cycle": Steadiness}
 """Fields that are records of their own."""
+_PLAIN: dict[str, type[Any]] = {"kept": bool, "request": str, "model_sha256": str}
+"""Types of the fields that are neither records nor mappings."""
+_SHOWN = {list: "a list", str: "text", int: "a number", float: "a number", bool: "true or false", type(None): "nothing"}
+"""JSON's other values, in words."""
 
 
 @dataclass(frozen=True)
@@ -123,18 +128,43 @@ def read_certificate(path: str | Path) -> Certificate:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "the certificate is missing")
-    try:
-        content = json.loads(read_text(path))
-        digest = content.pop("sha256")
-        good = content["format"] == 1 and digest == _digest(content)
-        margins = tuple(Margin(**m) for m in content.pop("margins"))
-        kept = {k: from_plain(RECORDS[k], content[k]) if k in RECORDS else content[k]
-                for k in Certificate.__dataclass_fields__ if k != "margins" and (k in content or k not in ADDED)}
-    except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(path, f"not a certificate ({type(e).__name__}: {e})") from None
-    if not good:
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError(path, f"not a certificate: expected a JSON object, got {_SHOWN[type(content)]}")
+    if content.get("format") != 1:
+        raise InputError(path, f"not a certificate: expected format 1, got {reprlib.repr(content.get('format'))}")
+    needed = {k for k in Certificate.__dataclass_fields__ if k not in ADDED} | {"sha256"}
+    if lacking := sorted(needed - set(content)):
+        raise InputError(path, f"not a certificate as `workbench optimize` writes it: {lacking[0]} is missing")
+    if content["sha256"] != _digest(content):
         raise InputError(path, "the certificate was changed after it was written")
-    return Certificate(margins=margins, **kept)
+    return _certificate(path, content)
+
+
+def _certificate(path: Path, content: Mapping[str, Any]) -> Certificate:
+    """The certificate of a JSON object; InputError names the field that is not as it is written."""
+    fields: dict[str, Any] = {}
+    for name in Certificate.__dataclass_fields__:
+        if name not in content and name in ADDED:
+            continue
+        try:
+            fields[name] = _field(name, content[name])
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(path, f"not a certificate as `workbench optimize` writes it: {name} has other content") from None
+    return Certificate(**fields)
+
+
+def _field(name: str, value: Any) -> Any:
+    """A field of its type; ValueError, KeyError, TypeError or AttributeError where the value cannot be that."""
+    if name == "margins":
+        if not isinstance(value, list) or not value:
+            raise TypeError(name)
+        return tuple(Margin(**m) for m in value)
+    if name in RECORDS:
+        return from_plain(RECORDS[name], value)
+    if not isinstance(value, _PLAIN.get(name, Mapping)):
+        raise TypeError(name)
+    return value
 
 
 def read_shape(motion: str | Path) -> GaitShape:

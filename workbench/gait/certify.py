@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,20 @@ from joblib import delayed
 
 from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
-from workbench.gait.draws import draw_margins, slip_margin
+from workbench.gait.draws import Drawn, draw_margins, slip_margin
 from workbench.gait.draws import summary as draw_summary
 from workbench.gait.examine import CertifyOptions, Examiner, NominalRun, OtherEngine, vendor_table
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.limit_cycle import LimitCycle
-from workbench.gait.limits import contact_margin, return_margin, run_margins, table_margins, violation
+from workbench.gait.limits import (
+    Margin,
+    binding,
+    contact_margin,
+    return_margin,
+    run_margins,
+    table_margins,
+    violation,
+)
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.record import Nominal, Steadiness
@@ -34,7 +43,7 @@ from workbench.robot import GRAVITY, RobotModel
 from workbench.simulation.cluster import stream_results
 from workbench.types import Progress
 
-__all__ = ["Certified", "CertifyOptions", "OtherEngine", "certify"]
+__all__ = ["Certified", "CertifyOptions", "Examination", "OtherEngine", "certify"]
 
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """A simulation, in words, and the function that runs it."""
@@ -55,58 +64,108 @@ class Certified:
 
 def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel], options: CertifyOptions,
             progress: Progress, provenance: dict[str, Any], other: tuple[str, OtherEngine] | None = None) -> Certified:
-    """Simulates a table on the request's robot, and states which limits it keeps.
+    """Simulates a table on the request's robot, and states which limits it keeps. Arguments as of `Examination`."""
+    return Examination(machine, request, table, draws, options, progress, provenance, other).finish()
+
+
+class Examination:
+    """The examination of a table, in two parts: the nominal robot and those of the ensemble, which refuse most gaits that are
+    refused; then numerical floor, other engines, way back to the cycle and straightening, which take longer. Each part is
+    simulated when it is first asked for.
 
     draws: robots of the ensemble that the search has not seen. provenance: entries for the certificate, to which the time taken
-    is added [s]. other: name of a second engine, and the engine. """
-    began = time.monotonic()
-    examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
-    robots = [request.on_slope(d) for d in draws[:options.draws]]
-    groups = _groups(robots)
-    probed = robots[-PROBED:] if len(robots) > 2 * PROBED else []  # others than those that are straightened
-    straightener = _straightener(machine, request, table, probed) if robots and options.trimmed else None
-    trimmed = _groups(robots[:min(options.trimmed, len(robots) - len(probed))]) if straightener is not None else []
-    variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
-    conditioned = () if other is None else conditions()
-    results = _run({
-        "nominal": [("nominal robot", examiner.nominal, ())],
-        "variants": [(f"numerics, {v}", examiner.variant, (v,)) for v in variants],
-        "elsewhere": [] if other is None else [
-            (f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned],
-        "in Drake": [(f"robot {k + 1} of {len(robots)} in Drake", examiner.compare_engines, (r,))
-                     for k, r in enumerate(robots[:options.checked])],
-        "cycle": [("back to its cycle", examiner.limit_cycle, (vendor_table(machine.model),))] if options.watched else [],
-        "robots": [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)],
-        "straightened": [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener],
-    }, options.n_jobs, progress)
-    run: NominalRun = results["nominal"][0]
-    nominal = run.measure
-    floor = _floor(request, dict(zip(variants, results["variants"])))
-    pairs = {c.name: pair for c, pair in zip(conditioned, results["elsewhere"])}
-    checks = results["in Drake"]
-    cycle: LimitCycle | None = results["cycle"][0] if options.watched else None
-    robots_drawn = [d for group in results["robots"] for d in group]
-    walks = [w for group in results["straightened"] for w in group]
-    draw_results, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
-    if straightener is not None:
-        draw_results["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
-    if checks:
-        draw_results["the same in Drake"] = _compare_with_drake(request, checks, options)
-    margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
-               *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
-               *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
-               *draw_margins(machine, request, on_draws), *floor_margins(request, nominal, floor),
-               *([] if cycle is None else [return_margin(cycle, request.limits)]),
-               *([trim_margin(request, walks)] if robots and options.trimmed and request.way != "turn" else [])]
-    elsewhere = {} if other is None else engines_summary(request, other[0], pairs)
-    margins += [] if other is None else engine_margins(request, other[0], pairs, options.compared)
-    certificate = Certificate(
-        kept=violation(margins) == 0.0, request=str(request),
-        asked=request.to_plain(), tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
-        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=draw_results, floor=floor,
-        other_engine=elsewhere, ways=run.ways, cycle=_cycle(cycle, run.measure, on_draws), shape=asdict(table.shape),
-        provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
-    return Certified(certificate, run.take, run.cycles, request)
+    is added [s]. other: name of a second engine, and the engine."""
+
+    def __init__(self, machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel],
+                 options: CertifyOptions, progress: Progress, provenance: dict[str, Any],
+                 other: tuple[str, OtherEngine] | None = None) -> None:
+        self.machine, self.request, self.table, self.options, self.other = machine, request, table, options, other
+        self._progress, self._provenance = progress, provenance
+        self._examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
+        self._robots = [request.on_slope(d) for d in draws[:options.draws]]
+
+    @cached_property
+    def refusal(self) -> Margin | None:
+        """The worst limit that the nominal robot and those of the ensemble break; None if they keep all."""
+        margins = self._on_robots.margins
+        return binding(margins) if violation(margins) > 0 else None
+
+    @cached_property
+    def _on_robots(self) -> _OnRobots:
+        """The first part."""
+        machine, request, limits = self.machine, self.request, self.request.limits
+        began, groups = time.monotonic(), _groups(self._robots)
+        results = self._run({
+            "nominal": [("nominal robot", self._examiner.nominal, ())],
+            "robots": [(f"robot {k * TOGETHER + 1} of {len(self._robots)}", self._examiner.robots, (g,))
+                       for k, g in enumerate(groups)]})
+        run: NominalRun = results["nominal"][0]
+        drawn = [d for group in results["robots"] for d in group]
+        nominal, on_draws = run.measure, [d.measure for d in drawn]
+        margins = (*table_margins(machine, self.table, limits), contact_margin(run.near, limits),
+                   *run_margins(machine, nominal, limits), slip_margin(machine, request, nominal),
+                   *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
+                   *draw_margins(machine, request, on_draws))
+        return _OnRobots(run, drawn, margins, time.monotonic() - began)
+
+    def finish(self) -> Certified:
+        """The certificate, after both parts."""
+        return self._certified
+
+    @cached_property
+    def _certified(self) -> Certified:
+        machine, request, options, other = self.machine, self.request, self.options, self.other
+        first, robots, began = self._on_robots, self._robots, time.monotonic()
+        probed = robots[-PROBED:] if len(robots) > 2 * PROBED else []  # others than those that are straightened
+        straightener = _straightener(machine, request, self.table, probed) if robots and options.trimmed else None
+        trimmed = _groups(robots[:min(options.trimmed, len(robots) - len(probed))]) if straightener is not None else []
+        variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
+        conditioned = () if other is None else conditions()
+        examiner = self._examiner
+        results = self._run({
+            "variants": [(f"numerics, {v}", examiner.variant, (v,)) for v in variants],
+            "elsewhere": [] if other is None else [
+                (f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned],
+            "in Drake": [(f"robot {k + 1} of {len(robots)} in Drake", examiner.compare_engines, (r,))
+                         for k, r in enumerate(robots[:options.checked])],
+            "cycle": [("back to its cycle", examiner.limit_cycle, (vendor_table(machine.model),))] if options.watched else [],
+            "straightened": [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener]})
+        run = first.run
+        floor = _floor(request, dict(zip(variants, results["variants"])))
+        pairs = {c.name: pair for c, pair in zip(conditioned, results["elsewhere"])}
+        cycle: LimitCycle | None = results["cycle"][0] if options.watched else None
+        walks = [w for group in results["straightened"] for w in group]
+        draw_results = draw_summary(request, first.drawn)
+        if straightener is not None:
+            draw_results["straightened"] = summary_of_straightened(walks, straightener.response.nominal_gain)
+        if results["in Drake"]:
+            draw_results["the same in Drake"] = _compare_with_drake(request, results["in Drake"], options)
+        margins = [*first.margins, *floor_margins(request, run.measure, floor),
+                   *([] if cycle is None else [return_margin(cycle, request.limits)]),
+                   *([trim_margin(request, walks)] if robots and options.trimmed and request.way != "turn" else [])]
+        margins += [] if other is None else engine_margins(request, other[0], pairs, options.compared)
+        certificate = Certificate(
+            kept=violation(margins) == 0.0, request=str(request), asked=request.to_plain(),
+            tables=hashes(gait=self.table.whole), model_sha256=machine.model.sha256, margins=tuple(margins),
+            nominal=_numbers(machine, request, run.measure, run.feet), draws=draw_results, floor=floor,
+            other_engine={} if other is None else engines_summary(request, other[0], pairs), ways=run.ways,
+            cycle=_cycle(cycle, run.measure, [d.measure for d in first.drawn]), shape=asdict(self.table.shape),
+            provenance={**self._provenance, "certified in": round(first.seconds + time.monotonic() - began, 1)})
+        return Certified(certificate, run.take, run.cycles, request)
+
+    def _run(self, work: Mapping[str, Sequence[Work]]) -> dict[str, list[Any]]:
+        """Results of a part's simulations by group."""
+        return _run(work, self.options.n_jobs, self._progress)
+
+
+@dataclass(frozen=True)
+class _OnRobots:
+    """Results of an examination's first part, the limits they show, and the time it took [s]."""
+
+    run: NominalRun
+    drawn: Sequence[Drawn]
+    margins: tuple[Margin, ...]
+    seconds: float
 
 
 def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:

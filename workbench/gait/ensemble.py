@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
-from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, read_yaml
 from workbench.gait.legs import legs_of
+from workbench.physical import MASS
 from workbench.robot import EffectSpec, RobotModel, data_file
 from workbench.robot.model_file import Posterior, parameter_names
 
@@ -118,6 +119,12 @@ def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -
     return model.with_masses(path, masses)
 
 
+MOST_SHARE = 0.9
+"""By which the mass of a link may vary: at 1, a link may have none."""
+MOST_ZERO = 15.0
+"""Standard deviation of a zero [deg]: at three of them, a horn sits two teeth off."""
+
+
 def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = None) -> Ensemble:
     """Reads the file (default: the bundled one). InputError names file, key and the expected value."""
     path = data_file(BUNDLED) if path is None else Path(path)
@@ -131,22 +138,31 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
             low, high = (float(f.required(k, f.number(k, least=0))) for k in ("low", "high"))
             if high < low:
                 raise f.error("high", f"expected at least {low:g}, got {high:g}")
+            _check_bounds(f, key, low, high)
             f.done()
             ranges[key] = (low, high)
 
-    def one(key: str, name: str) -> float:
+    def one(key: str, name: str, most: float) -> float:
         f = top.mapping(key)
         if f is None:
             return 0.0
-        value = float(f.required(name, f.number(name, least=0)))
+        value = float(f.required(name, f.number(name, least=0, most=most)))
         f.done()
         return value
 
-    mass, payload, zero = one("link_mass", "share"), one("payload", "mass"), one("zero_offset", "sd")
-    if mass >= 1:
-        raise InputError(path, f"link_mass.share: expected less than 1, got {mass:g}")
+    mass, zero = one("link_mass", "share", MOST_SHARE), one("zero_offset", "sd", MOST_ZERO)
+    payload = one("payload", "mass", MASS.most)
     top.done()
     return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
+
+
+def _check_bounds(f: Fields, key: str, low: float, high: float) -> None:
+    """InputError where a range exceeds what the effect that it draws can have."""
+    name, parameter = EFFECTS[key]
+    p = next(p for p in effect_named(name).parameters if p.name == parameter)
+    for bound, value in (("low", low), ("high", high)):
+        if not p.low <= value <= p.high:
+            raise f.error(bound, f"expected {p.low:g} to {p.high:g} {p.unit.removeprefix('1')}".rstrip() + f", got {value:g}")
 
 
 def _is_diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
@@ -156,8 +172,6 @@ def _is_diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
 
 def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Generator) -> RobotModel:
     """The diagnosed model with its effects' parameters drawn jointly, kept within the effects' bounds."""
-    from workbench.effects.registry import effect_named
-
     assert list(posterior.names) == list(parameter_names(model.effects))
     known_well = np.isfinite(np.diag(posterior.covariance))  # what the data say nothing about stays at its mean
     covariance = np.where(np.outer(known_well, known_well), posterior.covariance, 0.0)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from workbench.files import InputError
+from workbench.files.errors import in_words
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM
@@ -144,7 +145,7 @@ def load_map(path: str | Path, model: RobotModel) -> GaitMap:
         found = GaitMap(MapOptions(**options), tuple(Cell(**c) for c in cells), content["rollouts"], content["model_sha256"])
         good = content["format"] == 1
     except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(path, f"not a map of gaits ({type(e).__name__}: {e})") from None
+        raise InputError(path, f"not a map of gaits ({in_words(e)})") from None
     if not good:
         raise InputError(path, f"format: expected 1, got {content['format']}")
     if found.model_sha256 != model.sha256:

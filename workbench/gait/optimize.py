@@ -15,7 +15,7 @@ from workbench.files import InputError
 from workbench.files.option_checks import check_choice, check_whole
 from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
+from workbench.gait.certify import Certified, CertifyOptions, Examination, OtherEngine
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
@@ -125,10 +125,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             "generations": found.generations, "rollouts": found.rollouts, "refined": found.best is not before.best,
             "searched in": round(time.monotonic() - began, 1)}
 
-        def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
-            table = gait_table(machine, c.shape)
+        def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> Examination:
             origin = {**provenance, "finalist": finalist, **plan_entry(c, plans)}
-            return table, certify(machine, request, table, draws.certifying(), examined, progress, origin, other)
+            table = gait_table(machine, c.shape)
+            return Examination(machine, request, table, draws.certifying(), examined, progress, origin, other)
 
         def finish(met: bool, problem: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
             planned = plans.of(table.shape)
@@ -137,7 +137,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             return Optimized(request, met, problem, table, certified, found, comparison)
 
         refused: list[Candidate] = []
-        certified: list[tuple[GaitTable, Certified]] = []
+        examined: list[Examination] = []
         tried = finalists(machine, request, found, draws.screening(), options.screening, options.certify, memory, options.n_jobs,
                           progress)
         for k, walked in enumerate(tried):
@@ -145,21 +145,26 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
                 progress(f"finalist {k + 1} is refused: {binding(walked.margins)}", None)
                 refused.append(walked)
                 continue
-            certified.append(examine(walked, options.certify, k + 1))
-            if certified[-1][1].certificate.kept:
-                return finish(True, "", *certified[-1], replace(found, best=walked))
-            progress(f"finalist {k + 1} is not certified: {binding(certified[-1][1].certificate.margins)}", None)
-            if len(certified) == options.screening.certified:
+            examined.append(examine(walked, options.certify, k + 1))
+            broken = examined[-1].refusal
+            if broken is None:
+                certified = examined[-1].finish()
+                if certified.certificate.kept:
+                    return finish(True, "", examined[-1].table, certified, replace(found, best=walked))
+                broken = binding(certified.certificate.margins)
+            progress(f"finalist {k + 1} is not certified: {broken}", None)
+            if len(examined) == options.screening.certified:
                 break
-        if certified:
-            table, best = min(certified, key=lambda c: violation(c[1].certificate.margins))
-            return finish(False, _unmet(request, best.certificate.margins, None), table, best, found)
+        if examined:  # none is certified: the rest of each examination says which is nearest
+            best = min(examined, key=lambda e: violation(e.finish().certificate.margins))
+            return finish(False, _unmet(request, best.finish().certificate.margins, None), best.table, best.finish(), found)
         binds = min(refused, key=Candidate.rank, default=found.best)
         nearest = _nearest(found, refused)
         problem = _unmet(request, binds.margins, nearest)
         if nearest is None:
             return Optimized(request, False, problem, None, None, found)
-        return finish(False, problem, *examine(nearest, _briefly(options.certify), 0), found)
+        brief = examine(nearest, _briefly(options.certify), 0)
+        return finish(False, problem, brief.table, brief.finish(), found)
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:

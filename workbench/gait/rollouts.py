@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
+from workbench.cache import Cache
 from workbench.recording.take import Take
 from workbench.simulation import Job, simulate_batch
 from workbench.simulation.cluster import in_blocks, on_cluster
@@ -21,7 +21,7 @@ class Rollouts:
 
     def __init__(self, n_jobs: int = 2) -> None:
         self.n_jobs = n_jobs
-        self._robots: OrderedDict[str, CompiledJob] = OrderedDict()
+        self._robots: Cache[CompiledJob] = Cache(KEPT)
 
     def takes(self, jobs: Sequence[Job], as_seen: bool = True) -> Iterator[Take | None]:
         """The take of each job, in their order; None where the compiled station gave up because something other than a foot
@@ -45,12 +45,7 @@ class Rollouts:
     def _prepare(self, job: Job) -> CompiledJob | None:
         key = f"{job.model.sha256} {job.config!r}"
         try:
-            if key not in self._robots:
-                self._robots[key] = CompiledJob(job, apart=True)
-            self._robots.move_to_end(key)
-            while len(self._robots) > KEPT:
-                self._robots.popitem(last=False)
-            return self._robots[key].of(job)
+            return self._robots.get(key, lambda: CompiledJob(job, apart=True)).of(job)
         except NotCoveredError:
             return None
 

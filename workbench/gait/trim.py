@@ -23,8 +23,8 @@ from workbench.gait.table import GaitTable, gait_table
 from workbench.gait.turning import RecordedTurn, TurnEstimate, recorded_turn
 from workbench.recording.formats.read import read_recording
 from workbench.recording.mocap.angles import base_row, in_world
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import check_assets, tracks_of
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.quaternions import matrix
 from workbench.robot import RobotModel
 from workbench.types import Progress
@@ -90,7 +90,7 @@ def turn_in(recording: str | Path, model: RobotModel, period: float) -> Recorded
     if read.sensing != "mocap":
         raise InputError(recording, f"expected a recording by cameras, got {read.kind}: servos cannot measure the robot's path")
     check_assets(read, model)
-    tracks = mend(tracks_of(read), model)
+    tracks = repaired(read, model)
     base = base_row(tracks, model)
     if base is None:
         raise InputError(recording, f"expected the rigid body of '{model.base}', got {', '.join(tracks.assets)}")

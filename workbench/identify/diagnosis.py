@@ -131,7 +131,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames
     measured = geometry_of(session.model, evaluator.evidence, nominal.residuals) if gap else Geometry()
     build = _check_geometry(measured, evaluator, session.model, nominal)
-    read_off = (*build.measured, *read_off_registers(session))
+    read_off = (*build.measured, *read_off_registers(session, takes))
     build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
     as_built = _again(evaluator, known, takes, progress) if build.measured else evaluator
@@ -160,7 +160,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     after, floors = found.left_by(evaluator, progress)
     progress("judging the engine", None)
     apart[BESIDE_DRAKE.format("final")] = judge_by_drake(evaluator, fitted, "final")
-    findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
+    findings = (*(m.finding(*(change(evidence, m.places, nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
     unknown = found.unknown_torques(evidence, nominal.residuals, after)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -70,30 +71,30 @@ class Candidate:
         """Whether its sizes were estimated directly, 1 being the estimate."""
         return not self.effect.from_neutral
 
-    @property
+    @cached_property
     def given(self) -> list[Parameter]:
         """The effect's parameters, but those of options that it does not have here."""
         return [p for p in self.effect.parameters if p.option in ("", *self.options)]
 
-    @property
+    @cached_property
     def parameters(self) -> list[Parameter]:
         """The parameter behind each number; a vector has three."""
         return _by_number(self.given)
 
-    @property
+    @cached_property
     def least(self) -> list[float]:
         """The smallest possible value of each number, in the units of docs/formats.md."""
         lowest = dict(zip((p.name for p in self.effect.parameters), self.lowest))
         return [lowest.get(p.name, p.low) for p in self.parameters]
 
-    @property
+    @cached_property
     def takes_away(self) -> Mask:
         """Which sizes may be noticeably negative, because the effect can take away a constant of this robot."""
         far = [low < p.low and p.low - low >= FIT.least_taken * abs(t - n)
                for p, low, n, t in zip(self.parameters, self.least, self.neutral, self.typical)]
         return np.array([x for x, fixed in zip(far, self.fixed) if not fixed], dtype=bool)
 
-    @property
+    @cached_property
     def most(self) -> list[float]:
         """The largest possible value of each number, in the units of docs/formats.md."""
         return [n if self.less and p.adds_to else p.high for p, n in zip(self.parameters, self.neutral)]
@@ -111,12 +112,12 @@ class Candidate:
         c = Candidate.of(self.effect, self.where, neutral, options=tuple(sorted({*options})), lowest=self.lowest)
         return c.one_way()[-1] if self.less else c
 
-    @property
+    @cached_property
     def size(self) -> int:
         """How many numbers are fitted."""
         return self.fixed.count(False)
 
-    @property
+    @cached_property
     def shapes(self) -> Mask:
         """Which sizes belong to numbers that only shape the effect."""
         return np.array([p.shapes for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
@@ -147,7 +148,7 @@ class Candidate:
                 value = t / max(size, t / p.high)
             else:
                 value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
-            out.append(float(np.clip(value, low, high)))
+            out.append(float(min(max(value, low), high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:

@@ -135,21 +135,26 @@ class TakeEvidence:
         """Shifted later by the median over the joints: a start that one bad joint cannot move."""
         time, late, n = self.take.recorded.time, 0.0, len(self.joints)
         used = ~self.uses["validate"]
-        shifted = simulated
+        shifted = simulated[:, :n]
         for _ in range(PROBLEM.shifts):
-            slope = np.gradient(shifted[:, :n], time, axis=0) / self.sigma[:n]
-            r = (self.recorded[:, :n] - shifted[:, :n]) / self.sigma[:n]
+            slope = np.gradient(shifted, time, axis=0) / self.sigma[:n]
+            r = (self.recorded[:, :n] - shifted) / self.sigma[:n]
             good = np.isfinite(r) & np.isfinite(slope) & used[:, None]
             s, r = np.where(good, slope, 0.0), np.where(good, r, 0.0)
             sharpness = np.sum(s * s, axis=0)
             sharp = sharpness > 1.0
             if not sharp.any():
-                return shifted
+                break
             by_joint = -np.sum(s * r, axis=0)[sharp] / sharpness[sharp]
             most = PROBLEM.late if self.start_is_free else LOOP
             late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[sharp])), -most, most))
-            shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
-        return np.where(np.isfinite(simulated), shifted, np.nan)
+            shifted = _later(simulated[:, :n], time, late)
+        return simulated if late == 0.0 else np.where(np.isfinite(simulated), _later(simulated, time, late), np.nan)
+
+
+def _later(columns: Array, time: Array, late: float) -> Array:
+    """Columns (N, c) at `time` (N,), shifted later by `late` [s]."""
+    return np.column_stack([np.interp(time - late, time, c) for c in columns.T])
 
 
 def part_of(since: Array) -> NDArray[np.int_]:

@@ -20,8 +20,8 @@ from workbench.files.errors import MistypedError
 from workbench.files.problem import RoutineProblem
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import check_assets, tracks_of
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.plausibility import beyond_range
 from workbench.recording.take_from import named_by_model
@@ -141,11 +141,14 @@ def model_problems_of(model: RobotModel) -> list[str]:
     out = list(model.held_problems if model.held else model.problems)
     doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
     out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
+    out += model.ground.doubts
     given = set(model.servos)
     lacking = [j for j in model.joints if j not in given]
     if given and lacking:
         out.append(f"servos: none is given for {', '.join(lacking)}; taken as an AX-12A")
-    list(resolve(model))  # InputError for an invalid effect
+    acting = [" ".join([e.effect, *sorted(e.where)]) for _, e, _ in resolve(model)]  # InputError for an invalid effect
+    out += [f"effect '{name}' is given {acting.count(name)} times: they act together" for name in dict.fromkeys(acting)
+            if acting.count(name) > 1]
     return out
 
 
@@ -162,13 +165,23 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
         else:
             if model is not None:
                 check_assets(recording, model)
-            out += mend(tracks_of(recording), model).problems
+            out += repaired(recording, model).problems
+            out += _nothing_moved(recording)
     elif model is not None:
         named = named_by_model(recording, model)
         frames = model.kinematics.frames
         out += _not_logged(named, model)
         out += beyond_range(named, {j: (frames[j].lower, frames[j].upper) for j in model.joints})
     return sorted(dict.fromkeys(out), key=lambda text: isinstance(text, RoutineProblem))
+
+
+def _nothing_moved(recording: Recording) -> list[str]:
+    """A line if every body keeps its pose to the last digit throughout: cameras that see a body give it noise."""
+    paths = [np.hstack([body.p, body.quat]) for body in recording.rigid_bodies.values()]
+    seen = [path[np.isfinite(path).all(axis=1)] for path in paths]
+    if len(recording.time) < FILES.fewest_frames or any(len(path) and np.ptp(path, axis=0).any() for path in seen):
+        return []
+    return ["no body ever moves, to the last digit: was one pose exported, or was the capture paused?"]
 
 
 def _not_logged(log: Recording, model: RobotModel) -> list[str]:
@@ -244,7 +257,20 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    return [*_too_long(seconds), *out], seconds
+    return [*_unlikely(take, model, seconds), *_too_long(seconds), *out], seconds
+
+
+def _unlikely(take: TakeSpec, model: RobotModel, seconds: float) -> list[str]:
+    """Entries of a take that have no effect or cannot be meant, and a duration that shows nothing."""
+    out = []
+    if seconds < FILES.shortest:
+        out.append(f"lasts {seconds:.3g} s: a search compares stretches of {FILES.shortest:g} s; record longer takes")
+    if take.cycles is not None and take.motion is None:
+        out.append(f"cycles: {take.cycles} has no effect: the take has no motion, its commands are those of the recording")
+    if take.load is not None and take.load.mass > model.kinematics.mass:
+        out.append(f"load: {take.load.mass:g} kg weighs more than the robot ({model.kinematics.mass:.3g} kg): is it in another "
+                   "unit?")
+    return out
 
 
 def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:

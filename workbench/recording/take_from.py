@@ -12,8 +12,8 @@ from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.joint_names import named_by_model
 from workbench.recording.mocap.angles import angle_sigma, base_row, in_world, joint_angles
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import Tracks, check_assets, tracks_of
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import Tracks, check_assets
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -31,7 +31,7 @@ def take_from_recording(recording: Recording, measurement: Measurement, model: R
     label = name or Path(recording.source).stem
     if recording.sensing == "mocap":
         check_assets(recording, model)
-        take = take_from_tracks(mend(tracks_of(recording), model), measurement, model, label, base)
+        take = take_from_tracks(repaired(recording, model), measurement, model, label, base)
         return replace(take, problems=(*recording.problems, *take.problems))
     return _take_of_log(recording, measurement, model, label, base)
 

@@ -16,6 +16,7 @@ import yaml
 from workbench.files import InputError
 from workbench.files.nearest import did_you_mean
 from workbench.files.resources import resolve_model
+from workbench.physical import GROUND, check_ranges, doubts
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
 from workbench.robot.model_source import ModelSource, model_problems, prepare
@@ -34,17 +35,20 @@ _AX_12A = ServoConstants()
 @dataclass(frozen=True)
 class Ground:
     """The floor. friction: coefficient of foot on ground, both static and dynamic; None: the SDF's own. stiffness [N/m] of a
-    contact point; None or infinite: rigid. dissipation: Hunt and Crossley's [s/m]; None: 0. InputError for a negative number."""
+    contact point; None or infinite: rigid. dissipation: Hunt and Crossley's [s/m]; None: 0. InputError for an impossible
+    number (workbench/physical.py)."""
 
     friction: float | None = None
     stiffness: float | None = None
     dissipation: float | None = None
 
     def __post_init__(self) -> None:
-        for key in ("friction", "stiffness", "dissipation"):
-            v = getattr(self, key)
-            if v is not None and (isinstance(v, bool) or not isinstance(v, (int, float)) or not v >= 0):
-                raise InputError(None, f"{key}: expected a non-negative number, got {v!r}")
+        check_ranges(GROUND, asdict(self))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Values that no floor has, though they are not impossible."""
+        return tuple(f"ground.{text}" for text in doubts(GROUND, asdict(self)))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.mounting import written_mountings
-from workbench.robot.robot_section import read_model, read_servos
+from workbench.robot.robot_section import check_protocol, read_model, read_servos
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.types import Array
 
@@ -129,6 +129,7 @@ def load_model_file(path: str | Path) -> ModelFile:
     model = read_model(top)
     model = replace(model, servos={**model.servos, **read_servos(top, model.joints)},
                     effects=tuple(_effect(f, model) for f in top.sequence("effects")))
+    check_protocol(Fields(path, {}, "robot"), model.bus_ids, model.servos)
     posterior = _posterior(top.mapping("posterior"), model)
     given = top.mapping("provenance")
     provenance = {} if given is None else dict(given.items())
@@ -169,13 +170,17 @@ def _posterior(f: Fields | None, model: RobotModel) -> Posterior:
     f.done()
     expected = list(parameter_names(model.effects))
     if names != expected:
-        raise f.error("names", f"expected those of the effects, {', '.join(expected) or 'none'}")
+        raise f.error("names", f"expected those of the effects, {', '.join(expected) or 'none'}; where an effect was edited, "
+                               "delete `posterior`, which is of the effects as they were fitted")
     if not isinstance(mean, list) or len(mean) != len(expected):
         raise f.error("mean", f"expected a list of {len(expected)} numbers")
     square = isinstance(covariance, list) and all(isinstance(row, list) and len(row) == len(expected) for row in covariance)
     if not square or len(covariance) != len(expected):
         raise f.error("covariance", f"expected {len(expected)} rows of {len(expected)} numbers")
     rows = [_numbers(f, "covariance", row) for row in covariance]
+    bad = next((k for k, row in enumerate(rows) if row[k] < 0), None)
+    if bad is not None:
+        raise f.error("covariance", f"expected a variance of {expected[bad]}, got {rows[bad][bad]:g}")
     return Posterior(tuple(expected), np.array(_numbers(f, "mean", mean)), np.array(rows).reshape(len(expected), len(expected)))
 
 

@@ -9,8 +9,10 @@ JOINTS: tuple[str, ...] = (
 )
 """The thesis's alphabetical order, of every table that has columns without a header."""
 
-HIGHEST_BUS_ID = 253
-"""Of a servo; 254 addresses all servos of a bus at once."""
+HIGHEST_ID = MappingProxyType({1: 253, 2: 252})
+"""Highest ID of a servo by its protocol: 254 addresses all servos of a bus at once, and protocol 2 reserves 253 and 255, too."""
+HIGHEST_BUS_ID = max(HIGHEST_ID.values())
+"""Of a servo of any protocol."""
 BUS_IDS = MappingProxyType(
     dict(zip(JOINTS, (15, 13, 11, 14, 12, 10, 9, 7, 5, 8, 6, 4, 17, 16, 1)))
 )

@@ -8,11 +8,12 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import Fields, read_yaml
+from workbench.physical import GROUND
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.mounting import Mounting, read_lerobot, read_mountings
-from workbench.robot.names import BUS_IDS, HIGHEST_BUS_ID, RIGID_BODIES
+from workbench.robot.names import BUS_IDS, HIGHEST_BUS_ID, HIGHEST_ID, RIGID_BODIES
 from workbench.robot.servo_constants import KEYS, ServoConstants, servo_constants
-from workbench.robot.servo_profile_file import servo_profile, with_family_law
+from workbench.robot.servo_profile_file import family_of_servo, servo_profile, with_family_law
 
 _CONSTANTS = set(KEYS)
 
@@ -40,6 +41,7 @@ def read_model(top: Fields) -> RobotModel:
     ids, mountings = _bus(f, joints)
     feet = _feet(f, links)
     servos = read_servos(f, joints, by_family=True)
+    check_protocol(f, ids, servos)
     held = f.flag("held")
     f.done()
     return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, mountings=mountings, servos=servos or model.servos,
@@ -49,12 +51,12 @@ def read_model(top: Fields) -> RobotModel:
 def _ground(f: Fields | None) -> Ground | None:
     if f is None:
         return None
-    ground = Ground(
-        friction=f.number("friction", least=0), stiffness=f.number("stiffness", least=0, finite=False),
-        dissipation=f.number("dissipation", least=0),
-    )
+    given = {key: f.number(key, finite=not GROUND[key].infinite) for key in GROUND}
     f.done()
-    return ground
+    try:
+        return Ground(**given)
+    except InputError as e:
+        raise InputError(f.path, f"{f.place}.{e.problem}") from None
 
 
 def _packages(f: Fields) -> dict[str, str]:
@@ -112,6 +114,16 @@ def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
             raise given.error(joint, f"expected a bus ID of its own from 0 to {HIGHEST_BUS_ID}, got {number!r}")
         ids[joint] = number
     return ids
+
+
+def check_protocol(f: Fields, ids: Mapping[str, int], servos: Mapping[str, ServoConstants]) -> None:
+    """InputError in the file's section `robot`, f, where a servo cannot have its ID: protocol 2 reserves one that protocol 1
+    allows."""
+    for joint in sorted(ids.keys() & servos.keys()):
+        family = family_of_servo(servos[joint].model)
+        if family is not None and ids[joint] > HIGHEST_ID[family.protocol]:
+            raise f.error(f"bus_ids.{joint}", f"expected at most {HIGHEST_ID[family.protocol]}, the highest ID of protocol "
+                                              f"{family.protocol} ({family.name}), got {ids[joint]}")
 
 
 def read_servos(f: Fields, joints: tuple[str, ...], by_family: bool = False) -> dict[str, ServoConstants]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
+from workbench.physical import SERVO, STRONGEST, doubts
 from workbench.robot.law_covariance import LawCovariance, law_covariance
 from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable, torque_tables
@@ -84,14 +85,9 @@ class ServoConstants:
                 continue
             if v is None and f.name in (*_LAW, *TOLERANCES):
                 continue
-            if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v):
-                raise InputError(None, f"{f.name}: expected a number, got {v!r}")
-            most, unit = _BOUNDS.get(f.name, (math.inf, ""))
-            if v > most:
-                raise InputError(None, f"{f.name}: expected at most {most:g} {unit}, got {v:g}")
-            if v < 0 or (v == 0 and f.name in _POSITIVE):
-                sign = "positive" if f.name in _POSITIVE else "non-negative"
-                raise InputError(None, f"{f.name}: expected a {sign} number, got {v}")
+            problem = SERVO[f.name].problem(v)
+            if problem is not None:
+                raise InputError(None, f"{f.name}: {problem}")
 
     @property
     def margin(self) -> float:
@@ -177,20 +173,20 @@ class ServoConstants:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Values that no hobby servo has, though they are not impossible: mostly in a wrong unit."""
-        out = []
-        for name, (likely, unit, other) in _LIKELY.items():
-            v = getattr(self, name)
-            if v is not None and v > likely:
-                out.append(f"{name}: {v:g} {unit} is more than any hobby servo has ({likely:g} {unit}); is it in {other}?")
+        out = doubts(SERVO, {name: getattr(self, name) for name in SERVO})
         if (power := self.stall_torque * self.no_load_speed) > STRONGEST:
             out.append(f"stall_torque times no_load_speed: {power:.0f} W is more than any hobby servo "
                        f"has ({STRONGEST:g} W); is the torque in kg cm (0.098 N m), or the speed in another unit than rad/s?")
-        for name, (least, unit) in _LEAST.items():
-            if (v := getattr(self, name)) < least:
-                out.append(f"{name}: {v:g} {unit} is less than any hobby servo has ({least:g} {unit}); is it in another unit?")
+        if self.coulomb_friction >= self.torque_at_full_duty:
+            out.append(f"coulomb_friction: {self.coulomb_friction:g} N m holds the servo against its whole torque "
+                       f"({self.torque_at_full_duty:.3g} N m at {self.supply_voltage:g} V): it cannot move")
+        out += [f"{key}: sd {sd:g} is more than {MOST_UNKNOWN:g} times its value: was a share meant, or another number?"
+                for key, sd in self.sd if sd > MOST_UNKNOWN * abs(float(getattr(self, key) or math.inf))]
         return tuple(out)
 
 
+MOST_UNKNOWN = 3.0
+"""Standard deviation of a constant by its value: guesses are known to a factor of 3."""
 SHARES_KNOWN = {"supply_voltage": 0.10, "no_load_speed": 0.10, "coulomb_friction": 0.5, "viscous_friction": 0.5,
                 "reflected_inertia": 0.15}
 """How well a hobby servo's numbers are known where its servo.yaml does not say: supply and motor constant to what servos of one
@@ -203,32 +199,6 @@ _OPTIONAL = {f.name: f.default for f in fields(ServoConstants) if f.name in (
     "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", "covariance",
     "torque_tables", *TOLERANCES)}
 _LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
-_BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
-           "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
-           "reflected_inertia": (10.0, "kg m^2"), "compliance_slope": (1023.0, "counts"),
-           "compliance_margin": (1023.0, "counts"), "punch": (1023.0, "of 1023"),
-           "proportional_gain": (1e4, "duty per radian"), "minimum_duty": (1.0, "(full duty)"), "dead_zone": (90.0, "deg"),
-           "goal_delay": (1.0, "s"), "goal_ramp": (1e5, "deg/s"), "command_filter": (1.0, "s"),
-           "derivative_gain": (100.0, "duty per rad/s"), "load_friction": (2.0, "of the load"),
-           "torque_tolerance": (3.0, "(of the logarithm)"), "back_emf_tolerance": (3.0, "(of the logarithm)")}
-"""Ten times beyond any servo of a small robot; a larger value is in another unit or a mistake."""
-_LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
-           "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
-           "coulomb_friction": (2.0, "N m", "kg cm"), "viscous_friction": (1.0, "N m s/rad", "another unit"),
-           "reflected_inertia": (0.2, "kg m^2", "another unit"),
-           "proportional_gain": (100.0, "duty per radian", "the register's own units")}
-"""XH540 (11.7 N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V), XL-330 at its highest gain (47)."""
-_LEAST = {"stall_torque": (0.02, "N m"), "no_load_speed": (0.5, "rad/s"), "rated_voltage": (2.0, "V"),
-          "supply_voltage": (2.0, "V")}
-"""Servos of 2 g (0.05 N m), geared down to a turn in ten seconds, one cell."""
-STRONGEST = 75.0
-"""Stall torque times speed without load [W]: XH540 52, the strongest servos of model cars 66."""
-_POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
-
-
-def largest(key: str) -> float:
-    """The largest value of a constant that servo.yaml may state, in its unit."""
-    return _BOUNDS.get(key, (math.inf, ""))[0]
 
 
 def load_servo_constants(path: str | Path) -> ServoConstants:

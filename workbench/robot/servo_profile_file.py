@@ -78,7 +78,7 @@ def servo_profiles() -> Mapping[str, ServoProfile]:
 
 def servo_profile(model: str) -> ServoProfile:
     """The family of a servo by its name or a model's (as `model` in servo.yaml); InputError where nobody knows it."""
-    profile = _family_of(model)
+    profile = family_of_servo(model)
     if profile is not None:
         return profile
     raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
@@ -91,7 +91,7 @@ def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConst
     given: keys of the file; their values are kept, including 0. Servos of an unknown family stay as they are. Keys of the law by
     proportional gain are not added to a servo with the law by compliance.
     """
-    family = _family_of(servo.model)
+    family = family_of_servo(servo.model)
     if family is None:
         return servo
     keys = [k for k in MORE_KEYS if k in family.nominal and k not in given]
@@ -111,7 +111,8 @@ def model_name(number: int, protocol: int) -> str:
     return f"unknown model {number}"
 
 
-def _family_of(model: str) -> ServoProfile | None:
+def family_of_servo(model: str) -> ServoProfile | None:
+    """The family of a servo by its name or a model's; None where nobody knows it."""
     wanted = _plain(model)
     return next((p for p in servo_profiles().values() if wanted in (_plain(p.name), *map(_plain, p.models.values()))), None)
 

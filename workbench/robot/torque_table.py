@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from workbench.files import InputError
+from workbench.physical import SERVO
 
 DependsOn = Literal["angle", "angle and direction", "duty", "duty and direction", "speed"]
 """The argument of the torque. With direction: the torque changes sign with the motion, smoothly through rest."""
@@ -41,6 +42,9 @@ class TorqueTable:
             for value in getattr(self, name):
                 if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
                     raise InputError(None, f"{name}: expected finite numbers, got {value!r}")
+        for value in self.torque:
+            if (text := SERVO["stall_torque"].problem(max(abs(value), 1e-9))) is not None:
+                raise InputError(None, f"torque: {text}")
         if any(b <= a for a, b in zip(self.at, self.at[1:])):
             raise InputError(None, "at: expected increasing numbers")
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +12,13 @@ from workbench.robot import ServoConstants
 from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable
 from workbench.types import Array, Mask
+
+
+@lru_cache(maxsize=256)  # robots that a fit compares differ in few servos
+def _constants(s: ServoConstants) -> tuple[float, ...]:
+    """Of one servo, in the order of `ServoLaw`."""
+    return (s.gain, s.margin, s.punch_duty, s.torque_at_full_duty, s.back_emf, s.viscous_friction, s.coulomb_friction,
+            s.reflected_inertia, s.stall_torque / s.rated_voltage, s.derivative_gain, s.ramp, s.command_filter, s.load_friction)
 
 
 @dataclass(frozen=True)
@@ -39,15 +47,9 @@ class ServoLaw:
     @staticmethod
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
         """Stacks the constants of one servo a joint."""
-
-        def column(f: str) -> Array:
-            return np.array([getattr(s, f) for s in servos], dtype=float)
-
-        return ServoLaw(column("gain"), column("margin"), column("punch_duty"), column("torque_at_full_duty"),
-                        column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"),
-                        column("stall_torque") / column("rated_voltage"), column("derivative_gain"), column("ramp"),
-                        column("command_filter"), column("load_friction"),
-                        tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
+        columns = np.array([_constants(s) for s in servos], dtype=float).reshape(-1, 13).T.copy()
+        tables = tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables)
+        return replace(ServoLaw(*columns), tables=tables) if tables else ServoLaw(*columns)
 
     @property
     def line(self) -> TorqueSpeedLine:

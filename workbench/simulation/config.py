@@ -6,6 +6,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.files.option_checks import check_choice
+from workbench.physical import TIME_STEP
 from workbench.robot import RobotModel
 
 BASES = ("auto", "free", "fixed", "path")
@@ -67,6 +68,8 @@ class SimulationConfig:
             number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
             if not number or not 0 <= value < float("inf"):
                 raise InputError(None, f"{f.name}: expected a non-negative number, got {value!r}")
+        if self.time_step > TIME_STEP.most:
+            raise InputError(None, f"time_step: {TIME_STEP.problem(self.time_step)}")
         if self.time_step == 0 and self.drive == "fast_servo":
             raise InputError(None, "drive: fast_servo needs a discrete plant (time_step > 0)")
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from pydrake.geometry import Convex, HalfSpace, Mesh, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
@@ -95,6 +94,8 @@ def _mesh_parts(path: Path, scale: Array, rgba: Rgba) -> list[MeshPart]:
     """The file's triangles, a part for each material; `rgba` where it has none. glTF's y axis becomes z, as in Drake. We draw the
     triangles ourselves, because meshcat cannot show .glb, loads other files late, and stores a copy for each servo.
     """
+    import trimesh  # not all robots have meshes
+
     loaded = trimesh.load_scene(path)
     turn = np.eye(4)
     if path.suffix.lower() in (".glb", ".gltf"):

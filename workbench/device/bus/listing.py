@@ -10,7 +10,7 @@ from typing import Any
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
-from workbench.device.bus.survey import ALL_IDS, FIRST, FoundServo, Survey, survey
+from workbench.device.bus.survey import FIRST, FoundServo, Survey, all_ids, survey
 from workbench.device.bus.wire import ping
 from workbench.robot.servo_profile_file import model_name, servo_profiles
 from workbench.types import Progress
@@ -27,14 +27,14 @@ def list_servos(port: Any, strip_echo: bool = False, progress: Progress | None =
     protocol, without registers. BusError where no servo answers at all."""
     tell = progress or (lambda what, done: None)
     own = int(port.getBaudRate())
-    answered = _who(port, strip_echo, ALL_IDS, lambda done: tell("looking at each ID", done))
+    answered = _who(port, strip_echo, None, lambda done: tell("looking at each ID", done))
     rates = sorted({rate for p in servo_profiles().values() for rate in p.bit_rates.values()} - {own}, reverse=True)
     for k, rate in enumerate(rates):
         if answered:
             break
         tell(f"no servo answers at {own} bit/s; trying {rate}", k / len(rates))
         if port.setBaudRate(rate) and _who(port, strip_echo, FEW):
-            answered = _who(port, strip_echo, ALL_IDS)
+            answered = _who(port, strip_echo)
     if not answered:
         port.setBaudRate(own)
         raise BusError(f"no servo answers, at {own} bit/s or any other; is the servos' power on, and is this the right port?")
@@ -44,14 +44,15 @@ def list_servos(port: Any, strip_echo: bool = False, progress: Progress | None =
     return tuple(out)
 
 
-def _who(port: Any, strip_echo: bool, ids: Iterable[int],
+def _who(port: Any, strip_echo: bool, ids: Iterable[int] | None = None,
          tell: Callable[[float], None] = lambda done: None) -> dict[int, list[int]]:
-    """IDs that answer a ping, by protocol; patient until one has answered, then as patient as that one needed."""
+    """IDs that answer a ping, by protocol, of `ids` or else of all that it allows; patient until one has answered, then as
+    patient as that one needed."""
     out: dict[int, list[int]] = {}
-    asked = list(ids)
     for step, protocol in enumerate((1, 2)):
         profile = next(p for p in servo_profiles().values() if p.protocol == protocol)
         through = Bus(port, profile, strip_echo=strip_echo).port
+        asked = list(all_ids(protocol) if ids is None else ids)
         patience = max(float(port.patience), FIRST)
         for k, servo in enumerate(asked):
             tell((step + k / len(asked)) / 2)

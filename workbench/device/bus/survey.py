@@ -13,12 +13,12 @@ from workbench.device.bus.wire import measure_latency
 from workbench.files import InputError
 from workbench.robot import RobotModel, bus_ids
 from workbench.robot.mounting import JointServo, Mounting
+from workbench.robot.names import HIGHEST_ID
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profile
 from workbench.robot.servo_registers import ServoReading, ServoRegisters
 
 STATE = ("present_position", "present_voltage", "present_temperature")
-ALL_IDS = range(253)
 FIRST = 25.0
 """Time-out for a servo before any has answered [ms]: the default latency of an FTDI chip, and half as much again."""
 
@@ -100,14 +100,19 @@ def family_of(model: RobotModel) -> ServoProfile:
     return servo_profile(families.pop())
 
 
-def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
+def all_ids(protocol: int) -> range:
+    """IDs that a servo of a protocol can have."""
+    return range(HIGHEST_ID[protocol] + 1)
+
+
+def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] | None = None,
            progress: Callable[[str, float], None] | None = None) -> Survey:
-    """Asks every ID, then reads all registers of each servo that answered. Without a model no servo has a joint. BusError where
-    none answers; it says at which other bit rate servos do."""
+    """Asks `ids`, by default every one that the protocol allows, then reads all registers of each servo that answered. Without a
+    model no servo has a joint. BusError where none answers; it says at which other bit rate servos do."""
     joints = {} if model is None else {i: joint for joint, i in bus_ids(model).items()}
     mountings = {} if model is None else model.mountings
     bus.joints.update(joints)
-    wanted = sorted({*ids, *joints})
+    wanted = sorted({*(all_ids(bus.profile.protocol) if ids is None else ids), *joints})
     _measure(bus, [*joints, *(i for i in wanted if i not in joints)])
     numbers: dict[int, int] = {}
     for k, servo in enumerate(wanted):

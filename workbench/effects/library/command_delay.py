@@ -8,7 +8,12 @@ from collections.abc import Mapping
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.effects.schedules import LOOP, delay_commands
 from workbench.motion.commands import Commands
-from workbench.robot import EffectSpec, RobotModel
+from workbench.recording.servo_log.duty_register import RegisterLaw
+from workbench.robot import EffectSpec, RobotModel, ServoConstants
+
+REGISTER_ERROR = 0.002
+"""Standard error of a delay read from duty [s]: twelve sessions of one STS3215 gave delays 1.2 ms (RMS) apart; the
+ages of register and position differ by some milliseconds."""
 
 
 class CommandDelay(Effect):
@@ -32,6 +37,11 @@ class CommandDelay(Effect):
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
         columns = [commands.joints.index(j) for j in where] or range(len(commands.joints))
         return delay_commands(commands, columns, values["delay"], switched=values["delay"] > 0)
+
+    def in_duty(self, law: RegisterLaw, servo: ServoConstants) -> tuple[float, float] | None:
+        """Beyond the servo's own delay, as well as that is known."""
+        own = servo.share_known("goal_delay") * servo.goal_delay
+        return law.delay - servo.goal_delay, math.hypot(max(law.sd["delay"], REGISTER_ERROR), own)
 
 
 EFFECT = CommandDelay()

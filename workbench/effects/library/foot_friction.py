@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from workbench.effects.base import Parameter
 from workbench.effects.floor_friction import FloorFriction
+from workbench.physical import GROUND
 from workbench.robot import EffectSpec
 
 
@@ -14,7 +15,7 @@ class FootFriction(FloorFriction):
 
     name = "foot_friction"
     places = ("foot",)
-    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3, replaces=True),)
+    parameters = (Parameter("friction", "1", GROUND["friction"].low, GROUND["friction"].high, 0.3, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The friction coefficient of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."

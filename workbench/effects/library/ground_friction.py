@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from workbench.effects.base import Parameter
 from workbench.effects.floor_friction import FloorFriction
+from workbench.physical import GROUND
 from workbench.robot import EffectSpec, Ground
 
 
@@ -15,7 +16,7 @@ class GroundFriction(FloorFriction):
 
     name = "ground_friction"
     places = ("robot",)
-    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4, replaces=True),)
+    parameters = (Parameter("friction", "1", GROUND["friction"].low, GROUND["friction"].high, 0.4, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The friction coefficient between feet and floor is {spec.parameters['friction']:.2f}."

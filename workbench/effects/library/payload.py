@@ -6,6 +6,7 @@ import numpy as np
 
 from workbench.effects.base import Effect, Parameter, scalar, si_values, vector
 from workbench.effects.sdf import SdfRobot
+from workbench.physical import MASS
 from workbench.robot import EffectSpec, RobotModel
 
 
@@ -21,7 +22,7 @@ class Payload(Effect):
     includes = ("com_shift",)
     reduces_to = "com_shift"
     parameters = (
-        Parameter("mass", "kg", 0.0, 5.0, 0.05),
+        Parameter("mass", "kg", MASS.least, MASS.most, 0.05),
         Parameter("position", "m", -0.5, 0.5, 0.02, vector=True),
     )
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from workbench.effects.base import Effect, Parameter
+from workbench.physical import GROUND
 from workbench.robot import EffectSpec, RobotModel
 
 
@@ -16,7 +17,7 @@ class SoftGround(Effect):
     layer = "ground"
     places = ("robot",)
     observable_when_fixed = False
-    parameters = (Parameter("stiffness", "N/m", 200.0, 1e7, 5e3),)
+    parameters = (Parameter("stiffness", "N/m", GROUND["stiffness"].low, 1e7, 5e3),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Each contact point of a foot has a stiffness of {spec.parameters['stiffness']:.0f} N/m."

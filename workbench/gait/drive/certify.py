@@ -15,6 +15,7 @@ import numpy as np
 
 from workbench.device.tables.limits import check_limits
 from workbench.files import InputError
+from workbench.files.errors import in_words
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.files.reading import read_text, write_whole
 from workbench.gait.certificate import CLAIM, NAME, plain, read_certificate
@@ -163,10 +164,10 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
     text = read_text(at)
     try:
         content = json.loads(text)
-        digest, known = content.pop("sha256"), content["format"]
+        digest, known = content["sha256"], content["format"]
         good = digest == _digest(content)
     except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
+        raise InputError(at, f"not a family's certificate ({in_words(e)})") from None
     if not good:
         raise InputError(at, "it was changed after it was written")
     if known != FORMAT:
@@ -178,7 +179,7 @@ def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
         content_fields: dict[str, Any] = {name: content[name] for name in (*LIMITS, "draws", "gait", "model_sha256")}
         found = FamilyCertificate(**content_fields, step_map=step_map, problems=tuple(content["problems"]))
     except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
+        raise InputError(at, f"not a family's certificate ({in_words(e)})") from None
     if found.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({found.model_sha256[:12]}) than this ({model.sha256[:12]})")
     if found.gait != gait_sha256(gait):

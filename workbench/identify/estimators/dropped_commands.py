@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, ends_of, played_without, steps
@@ -62,6 +61,8 @@ class DroppedCommands:
 
     def finding(self) -> Finding:
         """With the 90 % interval of a share (Clopper and Pearson 1934)."""
+        from scipy.stats import binomtest  # half a second of imports, which most diagnoses do without
+
         low, high = binomtest(self.count, self.of).proportion_ci(0.9, "exact")
         return Finding(
             self.effect,

@@ -21,8 +21,8 @@ from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
-from workbench.recording.mocap.mending import mend
-from workbench.recording.mocap.tracks import seen_joints, tracks_of, turn_vectors
+from workbench.recording.mocap.mending import repaired
+from workbench.recording.mocap.tracks import seen_joints, turn_vectors
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 from workbench.types import Array
@@ -49,7 +49,7 @@ class UncertainValue:
 @dataclass(frozen=True)
 class Measured:
     """A direct estimate: a link that is not as long as drawn, a rotated horn, or a servo's register; value and standard deviation
-    in the unit of docs/formats.md. seen: how that is known, for a person."""
+    in the unit of docs/formats.md. where: joint or link, empty for the whole robot. seen: how that is known, for a person."""
 
     effect: str
     where: str
@@ -63,16 +63,21 @@ class Measured:
         return self.sigma**2
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """Where it acts, as an effect has it."""
+        return (self.where,) if self.where else ()
+
+    @property
     def spec(self) -> EffectSpec:
         """The effect, for a model."""
-        return EffectSpec(self.effect, (self.where,), {effect_named(self.effect).parameters[0].name: self.mean})
+        return EffectSpec(self.effect, self.places, {effect_named(self.effect).parameters[0].name: self.mean})
 
     def finding(self, fit: Change, validation: Change) -> Finding:
         """With the 90 % interval of the measurement."""
         p = effect_named(self.effect).parameters[0]
         half = CONCLUSIONS.z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
-        return Finding(self.effect, (self.where,), CONCLUSIONS.surest, {p.name: number}, fit, validation,
+        return Finding(self.effect, self.places, CONCLUSIONS.surest, {p.name: number}, fit, validation,
                        evidence=effect_named(self.effect).sentence(self.spec) + self.seen)
 
 
@@ -91,7 +96,7 @@ class Geometry:
 
     def select_untried(self, pool: Sequence[Candidate]) -> list[Candidate]:
         """The candidates of a pool that must still be tried."""
-        known = self.as_drawn | {(m.effect, (m.where,)) for m in self.measured}
+        known = self.as_drawn | {(m.effect, m.places) for m in self.measured}
         return [replace(c, typical=(self.near[c.key],)) if c.key in self.near else c for c in pool if c.key not in known]
 
 
@@ -124,7 +129,7 @@ def _child_link(model: RobotModel, joint: str) -> str:
 
 
 def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
-    tracks = mend(tracks_of(e.take.recording), model)
+    tracks = repaired(e.take.recording, model)
     return spans(tracks, seen_joints(tracks.assets, model, e.take.spec.base)[0])
 
 

@@ -1,22 +1,74 @@
-"""Physics known from the servos' own registers (`registers` of a session) before the first step."""
+"""Physics known from the servos' own registers, without simulation: those of a session (`registers`), and duty in its logs."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from workbench.compare.logged import register_laws
 from workbench.compare.session import Session
+from workbench.compare.session_takes import ReadTake
+from workbench.effects.base import Effect
+from workbench.effects.registry import known_effects
 from workbench.identify.estimators.geometry import Measured
 from workbench.identify.options import READ_OFF
+from workbench.identify.parameters import Key
+from workbench.recording.servo_log.duty_register import RegisterLaw
+from workbench.robot import RobotModel
 
 
-def read_off_registers(session: Session) -> tuple[Measured, ...]:
-    """Effects that registers tell, one for each that is not as the nominal model has it; none where the session names no file."""
-    if session.registers is None:
-        return ()
+def read_off_registers(session: Session, takes: Sequence[ReadTake]) -> tuple[Measured, ...]:
+    """Effects that registers tell, one for each that is not as the nominal model has it: of the session's file of registers, else
+    of the columns of duty in its logs."""
+    told, model = _of_file(session), session.model
+    known = {m.effect for m in told} | {e.effect for e in model.effects}
+    return (*told, *(m for m in read_off_duty(model, register_laws(takes)) if m.effect not in known))
+
+
+def read_off_duty(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> list[Measured]:
+    """Effects that the duty of servos shows, those that are surely there. laws: by joint."""
     out = []
-    for departure in session.registers.departures(session.model):
+    for (name, where), (value, error) in readings(model, laws).items():
+        effect = known_effects()[name]
+        p, neutral = effect.parameters[0], effect.neutral(model)[0]
+        if abs(value - neutral) > READ_OFF.geometry_sure * error and effect.lowest(model, where)[0] <= value <= p.high:
+            seen = f" Read from the servo{'s' * (not where)}' register of duty in the logs, without any simulation."
+            out.append(Measured(name, where[0] if where else "", value, error, seen))
+    return out
+
+
+def readings(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> dict[Key, tuple[float, float]]:
+    """First parameter and standard error of each effect that the duty of servos shows, by effect and place: of the robot where
+    that is possible and all of its joints agree."""
+    out = dict[Key, tuple[float, float]]()
+    for effect in known_effects().values():
+        shown = {joint: r for joint, law in laws.items() if (r := effect.in_duty(law, model.servo(joint))) is not None}
+        together = _together(effect, model, shown)
+        if together is not None:
+            out[effect.name, ()] = together
+        elif "joint" in effect.places:
+            out |= {(effect.name, (joint,)): r for joint, r in shown.items()}
+    return out
+
+
+def _together(effect: Effect, model: RobotModel, shown: Mapping[str, tuple[float, float]]) -> tuple[float, float] | None:
+    """One reading of all joints; None if the effect does not act on the whole robot, or where a joint has none or another."""
+    if "robot" not in effect.places or set(shown) != set(model.joints) or (len(shown) == 1 and "joint" in effect.places):
+        return None
+    values, errors = np.array(list(shown.values())).T
+    middle = float(np.median(values))
+    return None if (np.abs(values - middle) > READ_OFF.geometry_sure * errors).any() else (middle, float(errors.min()))
+
+
+def _of_file(session: Session) -> list[Measured]:
+    """None where the session names no file."""
+    out = []
+    for departure in session.registers.departures(session.model) if session.registers is not None else ():
         if departure.effect is not None:
             ((_, value),) = departure.effect.parameters.items()
             assert isinstance(value, float)
             seen = (f" Read from the servo's own register, without any recording: {departure.key} is {departure.found:g}, the "
                     f"model has {departure.nominal:g}.")
             out.append(Measured(departure.effect.effect, departure.joint, value, READ_OFF.register_exact * abs(value), seen))
-    return tuple(out)
+    return out

@@ -14,6 +14,7 @@ from workbench.identify.conclusions import ReadOff, Residuals, change, estimates
 from workbench.identify.evidence.fit import weights_covariance
 from workbench.identify.evidence.hypothesis import ZERO
 from workbench.identify.evidence.leftover import list_leftover
+from workbench.identify.evidence.motion_range import join_ranges, range_of, tell_faster
 from workbench.identify.evidence.nuisance import as_mapping, mixing, turned_horn, widen, with_known
 from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.evidence.step_errors import extrapolate
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
     from workbench.identify.results.tied_names import GravityOverTorque
+    from workbench.robot.law_covariance import MotionRange
 
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
@@ -85,8 +87,17 @@ class Explanation:
         for region, p in zip(self.rollouts.regions, self.posteriors):
             numbers = p.best.hypothesis.numbers
             n, covariance = len(numbers), p.best.covariance(region, self.options)
-            model = with_known(model, numbers, widen(covariance[:n, :n], self.options.formal))
+            observed = {joint: join_ranges(self._known_range(joint), self._range_now(joint)) for joint in region.joints}
+            model = with_known(model, numbers, widen(covariance[:n, :n], self.options.formal), observed)
         return model
+
+    def _known_range(self, joint: str) -> MotionRange | None:
+        """The motion from which an earlier diagnosis knew a joint's servo."""
+        known = self.nominal.servo(joint).covariance
+        return None if known is None or self.options.drift is None else known.observed
+
+    def _range_now(self, joint: str) -> MotionRange | None:
+        return range_of(joint, self.looked_at, self.nominal, self.options.motion)
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
@@ -99,6 +110,8 @@ class Explanation:
         out, ties = self._of_robot(evidence, before, after), {t.where: t for t in self.tied}
         for region, p in zip(self.rollouts.regions, self.posteriors):
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+            joint = region.joints[0]
+            beyond = tell_faster(joint, self._known_range(joint), self._range_now(joint), self.options.faster)
             for (c, x), s in zip(h.sizes(), h.slices()):
                 family, elsewhere = c.effect.family, p.elsewhere((c.name, c.where))
                 rival = p.rival((c.name, c.where), elsewhere)
@@ -109,6 +122,8 @@ class Explanation:
                     others.append(Alternative(of_all[0].name, of_all[0].where, CONCLUSIONS.surest - share))
                 tie = as_torque(region, self.options, p.best, c)
                 share *= 1.0 if tie is None else tie.share
+                unseen = beyond if c.effect.layer == "actuator" else ""
+                share *= self.options.changed if unseen else 1.0
                 others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
                 where = (*c.where, *(place for _, places in elsewhere for place in places))
                 fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
@@ -116,7 +131,8 @@ class Explanation:
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
                     estimates(c, x, covariance[s, s] if tie is None else tie.covariance(covariance[s, s], x)), fit, validation,
                     tuple(others[:1]),
-                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
+                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c)
+                    + unseen,
                     family=None if family is None else FamilyBelief(family, share * p.families[family]))
                 out.append(shared_by_tie(finding, ties.get(region.joints)))
         return tuple(sorted(out, key=lambda f: -f.confidence))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import t as student_t
+from scipy.special import gammaln, stdtrit
 
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
@@ -106,7 +105,7 @@ class Hypothesis:
 
     def slices(self) -> list[slice]:
         """The part of theta that belongs to each effect."""
-        ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
+        ends = accumulate((c.size for c in self.effects), initial=len(self.numbers))
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def alike(self) -> list[list[int]]:
@@ -202,7 +201,7 @@ def start(numbers: Sequence[Uncertain]) -> Hypothesis:
 @lru_cache(maxsize=1024)
 def _prior(n: int, effects: tuple[Candidate, ...], options: EvidenceOptions) -> Prior:
     center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
-    freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
+    freedom, furthest = [np.ones(n)], float(stdtrit(options.freedom, 0.995))
     for c in effects:
         low, high = c.bounds()
         shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()

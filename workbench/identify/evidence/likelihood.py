@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -38,7 +39,7 @@ class Likelihood:
     tails: float
     between: tuple[float, float]
 
-    @property
+    @cached_property
     def counts(self) -> Array:
         """Number of independent samples that each frame counts as (n,), at most one."""
         return np.asarray(np.minimum(self.span / (2.0 * self.tau), 1.0))
@@ -55,9 +56,14 @@ class Likelihood:
     def log(self, r: Array, s: float) -> float:
         """Log likelihood [nats]."""
         nu, scale = self.tails, self.scale(s)
-        constant = gammaln((nu + 1) / 2) - gammaln(nu / 2) - 0.5 * np.log(nu * np.pi)
-        each = constant - np.log(scale) - (nu + 1) / 2 * np.log1p(np.square(r / scale) / nu)
+        each = self._at_zero - np.log(scale) - (nu + 1) / 2 * np.log1p(np.square(r / scale) / nu)
         return float(self.counts @ each)
+
+    @cached_property
+    def _at_zero(self) -> float:
+        """Log density of no residual at a scale of 1 rad [nats]."""
+        nu = self.tails
+        return float(gammaln((nu + 1) / 2) - gammaln(nu / 2) - 0.5 * np.log(nu * np.pi))
 
     def rows(self, r: Array, s: float) -> Array:
         """Numbers (n,) of which half the squares are the log likelihood but for a constant: what least squares fit."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from workbench.identify.evidence.hypothesis import ZERO, Uncertain, zero_effect
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.physical import SERVO
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
-from workbench.robot.law_covariance import LawCovariance
-from workbench.robot.servo_constants import largest
+from workbench.robot.law_covariance import LawCovariance, MotionRange
 from workbench.types import Array
 
 ZERO_SD = math.radians(1.15)
@@ -113,19 +113,21 @@ def _scaled(servo: ServoConstants, scales: tuple[tuple[str, float], ...]) -> Ser
             out["no_load_speed"] /= by
         else:
             out[name] = getattr(servo, name) * by
-    out = {name: min(value, largest(name)) for name, value in out.items()}  # a fit may try all ends at once
+    out = {name: min(value, SERVO[name].most) for name, value in out.items()}  # a fit may try all ends at once
     return replace(servo, **out)  # type: ignore[arg-type]
 
 
-def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Array) -> RobotModel:
-    """The robot whose servo constants carry how well they are known now. covariance (k, k): of the numbers' z."""
+def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Array,
+               observed: Mapping[str, MotionRange | None] | None = None) -> RobotModel:
+    """The robot whose servo constants carry how well they are known now. covariance (k, k): of the numbers' z. observed: the
+    motion that shows them, by joint."""
     servos = {j: model.servo(j) for j in model.joints}
     M = mixing(numbers)
     C = M @ covariance @ M.T
     for joint in dict.fromkeys(n.joint for n in numbers):
         own = [k for k, n in enumerate(numbers) if n.joint == joint]
         names = [numbers[k].name for k in own]
-        servo = replace(servos[joint], covariance=LawCovariance.of(names, C[np.ix_(own, own)]))
+        servo = replace(servos[joint], covariance=LawCovariance.of(names, C[np.ix_(own, own)], (observed or {}).get(joint)))
         for name, k in zip(names, own):
             sd = math.sqrt(C[k, k])
             if name in OF_SHEET:

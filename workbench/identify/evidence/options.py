@@ -57,6 +57,17 @@ class LawOptions:
 
 
 @dataclass(frozen=True)
+class RangeOptions:
+    """How fast a joint moves in recordings. seldom: quantile of the magnitudes, so that a single bad reading is none of them.
+    smoothed [s]: over which angles are smoothed before they are differentiated twice: several readings, and less than a servo's
+    move; fewest: least number of rows for that."""
+
+    seldom: float = 0.99
+    smoothed: float = 0.1
+    fewest: int = 7
+
+
+@dataclass(frozen=True)
 class EvidenceOptions:
     """Defaults hold for all robots; none was set on a session.
 
@@ -86,9 +97,11 @@ class EvidenceOptions:
     rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one
     processor, several times the cost of twelve servo logs.
 
-    drift: how much a robot that was diagnosed before may have changed; None: the nominal robot is as designed. formal: factor on
-    the formal standard deviations of a servo's law, because differences through stick and slip understate them, by 2 to 8 on
-    three weighed rigs. law: the torque that no effect describes.
+    drift: how much a robot that was diagnosed before may have changed; None: the nominal robot is as designed. motion: how a
+    joint's range of motion is measured. faster: where a joint moves this many times faster than that diagnosis saw it, what its
+    servo does there may have been so before; changed: the probability that it is a change then: even odds, as nothing speaks for
+    either. formal: factor on the formal standard deviations of a servo's law, because differences through stick and slip
+    understate them, by 2 to 8 on three weighed rigs. law: the torque that no effect describes.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
@@ -127,6 +140,9 @@ class EvidenceOptions:
     similarity: float = 0.5
     apart: float = 2.0
     drift: SinceThen | None = None
+    motion: RangeOptions = field(default_factory=RangeOptions)
+    faster: float = 1.5
+    changed: float = 0.5
     formal: float = 3.0
     law: LawOptions = field(default_factory=LawOptions)
     sure: float = 3.0

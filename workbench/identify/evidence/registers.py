@@ -7,40 +7,38 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.compare.logged import register_laws
 from workbench.compare.session_takes import ReadTake
 from workbench.effects.registers import Registers
+from workbench.identify.estimators.registers import readings
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Rejected
 from workbench.identify.results.reasons import RefutedByRegister
+from workbench.robot import RobotModel
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
     """The servos' registers, log by log."""
     out = []
     for t in takes:
-        channels, duty, nominal = t.recording.channels, {}, {}
+        channels, duty = t.recording.channels, {}
         for joint in t.model.joints:
-            if (register := channels.get(f"duty.{joint}")) is None:
-                continue
-            on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
-            duty[joint] = np.where(on, register, np.nan)
-            goal, position = (channels.get(f"{name}.{joint}") for name in ("goal", "position"))
-            if goal is not None and position is not None:
-                servo, error = t.model.servo(joint), goal - position
-                beyond = np.maximum(np.abs(error) - servo.margin, 0.0)
-                nominal[joint] = np.where(on, np.copysign(servo.punch_duty * (beyond > 0) + servo.gain * beyond, error), np.nan)
-        out.append(Registers(duty, nominal, channels.get("voltage")))
+            if (register := channels.get(f"duty.{joint}")) is not None:
+                on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
+                duty[joint] = np.where(on, register, np.nan)
+        out.append(Registers(duty, channels.get("voltage")))
     return out
 
 
-def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
+def within_registers(candidates: Sequence[Candidate], model: RobotModel, takes: Sequence[ReadTake], options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
     """Candidates limited to the range allowed by the registers, and those refuted: for which even `refuted` of the
     typical size is further than `sure` standard errors from the register's value."""
-    logs, kept, refuted = registers_of(takes), [], []
+    logs, of_duty = registers_of(takes), readings(model, register_laws(takes))
+    kept, refuted = list[Candidate](), list[Rejected]()
     for c in candidates:
-        shown = c.effect.in_registers(logs, c.where)
+        shown = c.effect.in_registers(logs, c.where) or of_duty.get(c.key)
         if shown is None:
             kept.append(c)
             continue

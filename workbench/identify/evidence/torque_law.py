@@ -6,7 +6,7 @@ have one standard deviation, the strength of such a law; `EvidenceOptions.law` l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -155,9 +155,9 @@ def _radial(group: str, depends_on: DependsOn, x: Array, n: int, options: LawOpt
     return Functions(group, depends_on, at, np.exp(-0.5 * np.square((at[:, None] - middles) / width)))
 
 
-def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> tuple[Array, Array, Array]:
-    """A joint's motion in some takes: angle [rad], speed [rad/s], and duty of the nominal law without its ramp."""
-    out = []
+def course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> Iterator[tuple[Array, Array, Array]]:
+    """A joint's motion in each take that shows it, in the rows that are used: time [s], angle [rad], and duty of the nominal law
+    without its ramp."""
     for e in evidence:
         if joint not in e.channels:
             continue
@@ -174,6 +174,11 @@ def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> 
             servo = e.take.spec.robot(model).servo(joint)
             error = commands.goals[k, commands.joints.index(joint)] - q
             duty = ServoLaw.of([servo]).duty(error[:, None])[:, 0]
-        out.append((q, np.gradient(q, since), duty))
+        yield since, q, duty
+
+
+def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> tuple[Array, Array, Array]:
+    """The same of all takes together: angle [rad], speed [rad/s] and duty."""
+    out = [(q, np.gradient(q, since), duty) for since, q, duty in course(joint, evidence, model)]
     angle, speed, duty = (np.concatenate([np.empty(0), *column]) for column in zip(*out)) if out else (np.empty(0),) * 3
     return angle, speed, duty

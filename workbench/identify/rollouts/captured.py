@@ -19,6 +19,7 @@ from workbench.recording.mocap.tracks import SeenJoint, seen_joints, turn_quater
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import run_job, simulate_stream
 from workbench.simulation.cluster import on_cluster
 from workbench.simulation.compiled import NotCoveredError
@@ -37,24 +38,30 @@ class Rollout(NamedTuple):
     job: Job
 
 
+Made = dict[tuple[int, SimulationConfig], CompiledJob]
+"""Stations of rollouts that are played together, by the model (`id`) and the configuration."""
+
+
 def channels_stream(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]:
     """Channels (N, c) of each rollout as its take would have shown them, in their order, each as soon as it is there."""
     if on_cluster():
         yield from map(_observe, rollouts, simulate_stream([r.job for r in rollouts], n_jobs))
     elif n_jobs == 1 or len(rollouts) == 1:
-        yield from (_channels(r, compiled_for(r)) for r in rollouts)
+        made: Made = {}
+        yield from (_channels(r, compiled_for(r, made)) for r in rollouts)
     else:
         yield from _in_threads(rollouts, n_jobs)
 
 
 def seen_channels(rollout: Rollout) -> Array | None:
     """Channels (N, c) from the compiled station; None where it does not know the robot, or cameras did not see the take."""
-    compiled = compiled_for(rollout)
+    compiled = compiled_for(rollout, {})
     return None if compiled is None else _play_compiled(rollout, compiled)
 
 
 def _in_threads(rollouts: Sequence[Rollout], n_jobs: int) -> Iterator[Array]:
-    covered = [compiled_for(r) for r in rollouts]
+    made: Made = {}
+    covered = [compiled_for(r, made) for r in rollouts]
     others = iter(simulate_stream([r.job for r, c in zip(rollouts, covered) if c is None], n_jobs))
     with ThreadPoolExecutor(n_jobs) as threads:
         started = [None if c is None else threads.submit(_channels, r, c) for r, c in zip(rollouts, covered)]
@@ -74,16 +81,19 @@ def _channels(rollout: Rollout, compiled: CompiledJob | None) -> Array:
     return _observe(rollout, run_job(rollout.job)) if channels is None else channels
 
 
-def compiled_for(rollout: Rollout) -> CompiledJob | None:
-    """A rollout's job on the compiled station; None where this does not know the robot, or cameras did not see the take."""
+def compiled_for(rollout: Rollout, made: Made) -> CompiledJob | None:
+    """A rollout's job on the compiled station; None where this does not know the robot, or cameras did not see the take. made:
+    stations of the other rollouts, to which this one's is added: a robot's takes share its arrays and the rest it settles in."""
     e, job = rollout.evidence, rollout.job
     captured = e.take.recorded.zeroed and e.take.measurement.pivots and job.times is not None and job.start is None
     if not captured or job.config.engine == "drake":
         return None
+    key = (id(job.model), job.config)
     try:
-        compiled = CompiledJob(job)
+        compiled = made[key].of(job) if key in made else CompiledJob(job)
     except NotCoveredError:
         return None
+    made.setdefault(key, compiled)
     followed = set(e.joints) <= {j.name for j in _looked_at(e, rollout.model)}
     return compiled if followed or not compiled.between else None
 

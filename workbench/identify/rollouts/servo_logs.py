@@ -44,10 +44,10 @@ def most_together(evidence: Sequence[TakeEvidence], config: SimulationConfig,
     """How many requests are played at once: `PROBLEM.together`, or fewer where rollouts are so long and finely logged that their
     angles would take more than `PROBLEM.played` MiB."""
     largest = 1.0
-    for q, takes in questions:
-        every = replace(config, time_step=q.step * config.time_step).logged_every
+    for step, takes, joints in {(q.step, tuple(takes), len(q.model.joints)) for q, takes in questions}:
+        every = replace(config, time_step=step * config.time_step).logged_every
         seconds = sum(min(evidence[i].until, float(evidence[i].since[-1])) for i in takes)
-        largest = max(largest, 8 * len(q.model.joints) * seconds / every)
+        largest = max(largest, 8 * joints * seconds / every)
     return max(1, min(PROBLEM.together, int((PROBLEM.played << 20) / largest)))
 
 
@@ -62,7 +62,7 @@ def log_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
     """The angles (M, c) [rad] of each request at each log's `frames`, on some takes; None where the compiled station does not
     know the model's physics. config: of the search, whose steps a request counts; base and rest are a log's. Robots of one
     structure play a log together."""
-    held = {q.step: _log_config(replace(config, time_step=q.step * config.time_step)) for q, _ in questions}
+    held = {step: _log_config(replace(config, time_step=step * config.time_step)) for step in {q.step for q, _ in questions}}
     played = servo_angles([_jobs([evidence[i] for i in takes], q.model, held[q.step], q.horizon) for q, takes in questions])
     return [None if isinstance(angles, NotCoveredError) else
             [each[:, [q.model.joints.index(j) for j in evidence[i].joints]] for i, each in zip(takes, angles)]

@@ -46,7 +46,13 @@ def read_body_poses(path: Path) -> Recording:
     bodies = _bodies(header.names)
     if "time" not in header.names:
         raise InputError(source, f"line {header.lines}: expected a column 'time' [s], found {', '.join(header.names[:4])} …")
+    for n, name in enumerate(header.names):
+        if name in header.names[:n]:
+            raise InputError(source, f"line {header.lines}: column '{name[:40]}' is given twice")
     for body, of in bodies.items():
+        units = {header.names[i].endswith(_MM) for what, i in of.items() if what in PLACE}
+        if len(units) > 1 or (f"{body}.x" in header.names and f"{body}.x{_MM}" in header.names):
+            raise InputError(source, f"line {header.lines}: places of '{body}' in metres and in millimetres; expected one unit")
         lacking = [w for w in (*PLACE, *TURN) if w not in of]
         if lacking:
             raise InputError(source, f"line {header.lines}: body '{body}' has no column '{body}.{lacking[0]}'")

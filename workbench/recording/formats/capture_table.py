@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
+from workbench.files.listing import list_names
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.log_commands import order_problem
@@ -25,6 +27,11 @@ _THIN = 0.05
 _SLOWEST, _FARTHEST = 0.5, 20.0
 """Frames this far apart [s], or positions this far from each other [m], cannot come from a small robot in a room."""
 
+_FASTEST = 1e-4
+"""The fastest cameras take a frame in 0.5 ms [s]."""
+_AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
+_HALF_TURN = 0.97
+"""Least component of a quaternion that is half a turn about an axis, to 28 deg."""
 _LOST = 1.5
 """A step of more than so many usual ones lost a frame."""
 _OFF, _STEADY = 0.3, 0.95
@@ -60,6 +67,9 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
         bodies = {name: BodyTrack(_y_up(b.p), np.concatenate([b.quat[:, :1], _y_up(b.quat[:, 1:])], axis=1))
                   for name, b in bodies.items()}
     problems = [*capture.problems, *_doubts(capture)]
+    unseen = [name for name, p in markers.items() if not np.isfinite(p).all(axis=1).any()]
+    if unseen:
+        problems.append(f"markers never seen: {list_names(unseen, 6)}")
     if not bodies and markers:
         bodies = bodies_of_markers(markers)
         if bodies:
@@ -90,22 +100,37 @@ def _frames(source: str, time: Array) -> tuple[NDArray[np.int64], float]:
 
 
 def _doubts(capture: Capture) -> list[str]:
-    """Values that cannot come from a small robot in a room: frames too far apart in time, positions too far from each other, and
-    quaternions whose scalar comes last."""
+    """Values that cannot come from a small robot in a room: frames too far apart in time or too close, positions too far from
+    each other, and quaternions whose components are exchanged."""
     out = []
     apart = float(np.median(np.diff(capture.time)))
     if apart > _SLOWEST:
         out.append(f"time: frames are {apart:g} apart: are the times frame numbers or milliseconds? (seconds are expected)")
+    elif apart < _FASTEST:
+        out.append(f"time: frames are {apart:.3g} s apart, faster than cameras are: are the times, or the file's rate, in "
+                   "another unit? (seconds and frames per second are expected)")
     seen = [p[np.isfinite(p).all(axis=1)] for p in (*(p for p, _ in capture.bodies.values()), *capture.markers.values())]
     places = np.concatenate([p for p in seen if len(p)]) if any(map(len, seen)) else np.zeros((1, 3))
     if (size := float(np.ptp(places, axis=0).max())) > _FARTHEST:
         out.append(f"positions are up to {size:.4g} m apart: are they in millimetres? (expected: metres, or columns BODY.x_mm)")
-    first = [q[np.isfinite(q).all(axis=1)][:1] for _, q in capture.bodies.values()]
-    turned = [abs(float(q[0, 3])) > 0.97 for q in first if len(q)]
-    if turned and all(turned):
+    axis = half_turned([q for _, q in capture.bodies.values()])
+    if axis == "z":
         out.append("every body starts half a turn about z from neutral (qw near 0, qz near 1): are the quaternions written "
                    "x, y, z, w?")
+    elif axis is not None:
+        out.append(f"every body starts half a turn about {axis} from neutral (qw near 0, q{axis} near 1): are the columns of the "
+                   "quaternions exchanged?")
     return out
+
+
+def half_turned(quats: Sequence[Array]) -> Literal["x", "y", "z"] | None:
+    """The axis about which all bodies begin half a turn from no rotation, by their quaternions (N, 4) wxyz; None if they do
+    not."""
+    first = [q[seen][0] for q in quats if (seen := np.isfinite(q).all(axis=1)).any()]
+    for axis in _AXES if first else ():
+        if all(abs(float(q[1 + _AXES.index(axis)])) > _HALF_TURN for q in first):
+            return axis
+    return None
 
 
 def _y_up(v: Array) -> Array:
@@ -114,10 +139,11 @@ def _y_up(v: Array) -> Array:
 
 
 def bodies_of_markers(markers: Mapping[str, Array]) -> dict[str, BodyTrack]:
-    """Rigid bodies of markers (N, 3) [m] that are called BODY_1, BODY:top, BODY.front and so on, three of each at least and not
-    on a line. A body's pivot is the middle of its markers; its rotation is none in the first frame that shows them all."""
+    """Rigid bodies of markers (N, 3) [m] that are called BODY_1, BODY:top, BODY.front and so on, three of each at least that
+    were ever seen, and not on a line. A body's pivot is the middle of its markers; its rotation is none in the first frame that
+    shows them all."""
     groups: dict[str, list[str]] = {}
-    for name in markers:
+    for name in (n for n, p in markers.items() if np.isfinite(p).all(axis=1).any()):
         found = re.fullmatch(r"(.+?)(?:[:._\- ][^:._\- ]+|\d+)", name)
         if found:
             groups.setdefault(found.group(1), []).append(name)

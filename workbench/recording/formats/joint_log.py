@@ -79,9 +79,15 @@ def _check_names(source: str, names: list[str], line: int) -> None:
             raise InputError(source, f"line {line}: unknown column '{name[:40]}'; expected time, voltage, or one of "
                                      f"{', '.join(k + '.JOINT' for k in _SCALE)}")
         if dot and f"goal.{joint}" not in names:
-            raise InputError(source, f"line {line}: column '{name}' without 'goal.{joint}'")
+            near = next((n for n in names if n.startswith("goal.") and _plain(n) == _plain(f"goal.{joint}")), None)
+            hint = "" if near is None else f"; '{near}' differs in case or blanks: write both alike"
+            raise InputError(source, f"line {line}: column '{name}' without 'goal.{joint}'{hint}")
     if "time" not in names or not any(n.startswith("goal.") for n in names):
         raise InputError(source, f"line {line}: expected a column 'time' and goals of joints")
+
+
+def _plain(name: str) -> str:
+    return "".join(name.split()).lower()
 
 
 def _cut_number(content: Bytes, line: int) -> tuple[str, ...]:

@@ -67,6 +67,10 @@ def _why_out_of_order(time: Array) -> str:
         for unit in (1.0, 1e-3, 1e-6):
             if np.all(np.abs(falls - 2.0**bits * unit) < 3 * usual):
                 return f"a counter of {bits} bits that starts again: add {2.0**bits * unit:.10g} to the times from there on"
+    for wraps, clock in ((86400.0, "a day, at midnight"), (43200.0, "half a day"), (3600.0, "an hour")):
+        for unit, name in ((1.0, "s"), (1e3, "ms"), (1e6, "us")):
+            if usual < 0.01 * wraps * unit and np.all(np.abs(falls - wraps * unit) < 3 * usual):
+                return f"a clock that starts again after {clock}: add {wraps * unit:.10g} {name} to the times from there on"
     if len(back) == 1 and known[back[0] + 1] <= known[0] + usual:
         return "the times start again: two logs in one file? Split it there"
     if len(back) <= 0.05 * len(steps):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.capture_table import half_turned
 from workbench.recording.formats.motive_header import (
     Asset,
     MotiveHeader,
@@ -19,6 +20,7 @@ from workbench.recording.formats.motive_header import (
     metres_per_unit,
     number,
     parse_header,
+    rewritten_orders,
 )
 from workbench.recording.formats.numbers import Bytes, column, read_columns, stack_columns, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
@@ -45,7 +47,7 @@ def read_motive(path: str | Path) -> Recording:
     header = parse_header(source, memoryview(mapped))
     scale = metres_per_unit(source, header)
     table = _read_body(source, mapped, header)
-    problems: list[str] = []
+    problems = rewritten_orders(header)
     frames = _frames(source, header, table, problems)
     rate = _rate(source, header, table, frames, problems)
     frames, rate = _on_clock(header, table, frames, rate, problems)
@@ -60,6 +62,7 @@ def read_motive(path: str | Path) -> Recording:
             namesake = asset.kind != "Marker" and asset.name in raw  # the raw marker replaces the solved one
             name = _make_unique(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
             markers[name] = stack_columns(table, _in_order(asset.position, "XYZ")).T * scale
+    problems += _half_turned(source, header, bodies)
     names = [a.name for a in header.assets if a.kind in _BODIES and (a.rotation or a.position)]
     for name in dict.fromkeys(n for n in names if names.count(n) > 1):
         problems.append(f"{names.count(name)} rigid bodies are called '{name}': they cannot be told apart; rename them in "
@@ -109,6 +112,20 @@ def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, sca
         p *= scale
     error = None if asset.error is None else column(table, asset.error) * scale
     return BodyTrack(p=p.T, quat=quat, error=error)
+
+
+def _half_turned(source: str, header: MotiveHeader, bodies: Mapping[str, BodyTrack]) -> list[str]:
+    """A line if every body begins turned by half a turn about one axis, as the robot stands in neutral. InputError where the
+    header's order of the columns is not Motive's either: then the values are still in Motive's."""
+    axis = half_turned([body.quat for body in bodies.values()])
+    if axis is None:
+        return []
+    text = f"every body begins half a turn about {axis} from neutral (W near 0, {axis.upper()} near 1)"
+    order = next((order for a in header.assets if (order := a.order("rotation")) not in ("", "XYZW", "XYZ")), None)
+    if order is not None:
+        raise InputError(source, f"header: Rotation columns are in the order {','.join(order)}, but {text}: are the values still "
+                                 "in the order X,Y,Z,W, as Motive writes them?")
+    return [f"{text}: are the values in another order than the header's X,Y,Z,W?"]
 
 
 def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[str]) -> NDArray[np.int64]:

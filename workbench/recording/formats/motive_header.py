@@ -26,6 +26,11 @@ class Asset:
     position: dict[str, int] = field(default_factory=dict)
     error: int | None = None
 
+    def order(self, what: str) -> str:
+        """Axis letters of its "rotation" or "position" in the order of the columns; empty where it has none."""
+        columns: dict[str, int] = getattr(self, what)
+        return "".join(sorted(columns, key=columns.__getitem__))
+
 
 @dataclass(frozen=True)
 class MotiveHeader:
@@ -127,6 +132,11 @@ def _header(source: str, rows: list[list[str]], offset: int) -> MotiveHeader:
             parents[name] = cell(labelled["Parent"], i)
     for asset in assets.values():
         _check(source, asset)
+    _check_orders(source, list(assets.values()))
+    written = metadata.get("Rotation Type", "")
+    if written.upper() in _ORDERS and any("W" in asset.rotation for asset in assets.values()):
+        raise InputError(source, f"header: Rotation Type '{written}', Euler angles, but columns Rotation W, of quaternions; "
+                                 "expected one of the two")
     return MotiveHeader(metadata, len(axes), offset, len(rows), tuple(assets.values()), timecode, parents)
 
 
@@ -135,6 +145,34 @@ def _check(source: str, asset: Asset) -> None:
         missing = set("XYZ") - set(group)
         if group and missing:
             raise InputError(source, f"header: {what} of '{asset.name}' has no column {sorted(missing)[0]}")
+    if "W" in asset.position:
+        raise InputError(source, f"header: column {asset.position['W'] + 1} is Position W of '{asset.name}'; a position has X, Y "
+                                 "and Z")
+
+
+def _check_orders(source: str, assets: list[Asset]) -> None:
+    """InputError where columns of two assets have their axes in different orders: no export has, so that a name was exchanged."""
+    for what in ("rotation", "position"):
+        first: dict[int, tuple[str, str]] = {}
+        for asset in assets:
+            order = asset.order(what)
+            other, name = first.setdefault(len(order), (order, asset.name))
+            if order != other:
+                raise InputError(source, f"header: {what.capitalize()} columns of '{name}' are in the order {','.join(other)}, "
+                                         f"those of '{asset.name}' in {','.join(order)}; expected one order, as Motive writes")
+
+
+def rewritten_orders(header: MotiveHeader) -> list[str]:
+    """A line for each kind of column whose axes are not in the order in which Motive writes them: then another program wrote the
+    header, the values or both, and only the names say what is in a column."""
+    out = []
+    for what in ("rotation", "position"):
+        orders = {asset.order(what) for asset in header.assets} - {""}
+        for order in sorted(orders - {"XYZW", "XYZ"}):
+            own = "".join(sorted(order, key="XYZW".index))
+            out.append(f"the header has {what} columns in the order {','.join(order)}, where Motive writes {','.join(own)}: "
+                       "another program changed this file; each column is read by its name: check that its values moved along")
+    return out
 
 
 def metres_per_unit(source: str, header: MotiveHeader) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from workbench.files import InputError
+from workbench.files.errors import in_words
 from workbench.files.reading import parse_json, read_text, write_whole
 from workbench.motion.commands import Commands
 from workbench.recording.formats.log_commands import out_of_order
@@ -72,7 +73,7 @@ def load_rollout(path: str | Path) -> Take:
         commands = None if about["commands"] is None else _commands_in(about["commands"])
         problems = tuple(map(str, about["problems"]))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError) as e:
-        raise InputError(path, f"line 2: expected a JSON description of the take ({type(e).__name__}: {e})") from None
+        raise InputError(path, f"line 2: expected a JSON description of the take ({in_words(e)})") from None
     columns = number_columns(path, lines[3], first_line=4, skip_blank=True)
     joints = tuple(c.removeprefix("position.") for c in columns if c.startswith("position."))
     feet = dict.fromkeys(c.split(".")[1] for c in columns if c.startswith("contact."))

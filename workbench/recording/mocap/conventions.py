@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
-from workbench.recording.mocap.tracks import Tracks
+from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes
 from workbench.robot import RobotModel
 from workbench.types import Array
 
@@ -21,6 +21,7 @@ _SHARE = 0.25
 """Least misfit with y up, as a share of the robot's size, at which z up is tried; that must leave less than twice this share of
 the misfit."""
 
+_NAMES = "XYZ"
 _ODD = 0.1
 """Least misfit, as a share of the robot's size, at which mirrored or exchanged bodies are considered."""
 _BETTER = 0.4
@@ -63,7 +64,8 @@ def layout_yaw(tracks: Tracks, model: RobotModel) -> float | None:
 
 
 def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | None:
-    """A line if first positions (A, 3) fit the links (A, 3) far better when mirrored, or with two bodies exchanged."""
+    """A line if first positions (A, 3) fit the links (A, 3) far better when mirrored, with two bodies exchanged, or with their
+    columns in another order."""
     now = _misfit(places, links)
     mirrored = _misfit(places * np.array([1.0, -1.0, 1.0]), links)
     pairs = {}
@@ -72,8 +74,15 @@ def _arrangement(names: Sequence[str], places: Array, links: Array) -> str | Non
         order[[a, b]] = b, a
         pairs[a, b] = _misfit(places[order], links)
     (a, b), exchanged = min(pairs.items(), key=lambda pair: pair[1])
-    if min(mirrored, exchanged) > _BETTER * now:
+    in_file = capture_axes(places)
+    orders = {order: _misfit(model_axes(in_file[:, [order.index(name) for name in _NAMES]]), links)
+              for order in map("".join, permutations(_NAMES)) if order != _NAMES}
+    held, moved = min(orders.items(), key=lambda pair: pair[1])
+    if min(mirrored, exchanged, moved) > _BETTER * now:
         return None
+    if moved < _BETTER * min(mirrored, exchanged):
+        return (f"the bodies' first places fit the robot's links if the file's X,Y,Z hold {','.join(held)}: are the columns of "
+                "the positions exchanged?")
     if mirrored <= exchanged:
         return ("the bodies' first places are the mirror image of the robot's links: are the capture's axes left-handed, or are "
                 "all bodies of the left and the right exchanged? Export again with right-handed axes, or correct `rigid_bodies`")

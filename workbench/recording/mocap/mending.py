@@ -8,9 +8,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.cache import Cache
 from workbench.files.problem import RoutineProblem
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
+from workbench.recording.mocap.exchanged_axes import exchanged_components
 from workbench.recording.mocap.swaps import unswap
 from workbench.recording.mocap.tracks import Tracks, tracks_of
 from workbench.recording.mocap.unseen import without_unseen
@@ -22,6 +24,21 @@ LONGEST_MENDED = 0.05
 """Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop, so they stay open."""
 _SPIKE = 0.06
 _ARM = 0.1  # [m] arm at which a rotation counts as a distance
+KEPT, LONGEST_KEPT = 4, 100_000
+"""Number of repaired recordings that are kept, and the most poses of each: 10 MB."""
+_repaired: Cache[Tracks] = Cache(KEPT)
+
+
+def repaired(recording: Recording, model: RobotModel | None) -> Tracks:
+    """The recording's tracks, repaired by `mend`. Those of the last recordings are kept: a session's are asked for when it is
+    checked, at each registration, and as takes."""
+    def mended() -> Tracks:
+        return mend(tracks_of(recording), model)
+
+    if len(recording.time) * len(recording.rigid_bodies) > LONGEST_KEPT:
+        return mended()
+    known = () if model is None else (id(model.kinematics), *model.rigid_bodies.items())
+    return _repaired.get((id(recording), *known), mended, (recording, model))
 
 
 def mend(tracks: Tracks, model: RobotModel | None = None) -> Tracks:
@@ -31,6 +48,8 @@ def mend(tracks: Tracks, model: RobotModel | None = None) -> Tracks:
     tracks = without_unseen(tracks)
     if model is not None:
         tracks = conventional(tracks, model)
+        if (text := exchanged_components(tracks, model)) is not None:
+            tracks = replace(tracks, problems=(*tracks.problems, text))
     tracks = _continuous_signs(tracks)
     tracks = unswap(tracks, model)
     tracks = _without_spikes(tracks)

@@ -12,10 +12,10 @@ from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.joint_names import named_by_model
 from workbench.recording.mocap.angles import Angles, joint_angles
-from workbench.recording.mocap.mending import mend
+from workbench.recording.mocap.mending import repaired
 from workbench.recording.mocap.pivots import base_origin, find_pivots
 from workbench.recording.mocap.start import StartEstimate, find_start, lagged_reference
-from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets, tracks_of
+from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets
 from workbench.recording.mocap.yaw import YawEstimate, yaw_of
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.servo_log.state import count_of, count_that_stays, first_command, resolution, staying
@@ -45,7 +45,7 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
     if recording.sensing == "encoders":
         return _register_log(recording, model, starts_at)
     check_assets(recording, model)
-    tracks = mend(tracks_of(recording), model)
+    tracks = repaired(recording, model)
     heading = YawEstimate(yaw, float("nan"), {}) if yaw is not None else yaw_of([tracks], model, [commands], base)
     angles = joint_angles(tracks, model, heading.yaw, base)
     start = _start(recording, tracks, angles, commands, predicted, starts_at)

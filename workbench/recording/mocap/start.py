@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -36,13 +37,12 @@ class StartEstimate:
 def lagged_reference(commands: Commands) -> Take:
     """A substitute for a simulated take, at 1 kHz from 0.3 s before the first command: the servos' reference passed through a
     critically damped second-order lag."""
-    from scipy.signal import lfilter
-
     time = np.arange(-0.3, commands.end + 0.5, 1e-3)
     keep = np.exp(-_LAG * 1e-3)
+    recursion = np.array([np.ones(len(time)), np.full(len(time), -keep)])  # q[k] - keep q[k-1] is the new share of the goal
     q = commands.reference(time)
     for _ in range(2):
-        q = np.asarray(lfilter([1 - keep], [1, -keep], q, axis=0))
+        q = np.asarray(solve_banded((1, 0), recursion, (1 - keep) * q))
     return Take(name="reference", source="reference", time=time, joints=commands.joints, q=q, starts_at=0.0,
                 zeroed=True, commands=commands)
 

@@ -26,7 +26,9 @@ class RegisterChecks:
     position. fewest: least number of rows with torque on. start: seconds left out at the log's beginning, in which the register
     holds an earlier value. delays [s], ramps [rad/s], duty: initial values of the fit. error: residual [rad of goal] above which
     it counts less. soft: width of the sign [rad], half a count. sure: share of the ramp below which its standard error has to be,
-    else no goal was fast enough to identify it. missed: median residual [rad of goal] beyond which the law is another.
+    else no goal was fast enough to identify it. missed: median residual [rad of goal] beyond which the law is another,
+    unless it is less than `share` of the error behind the duty: register and position are read at different times, which costs a
+    fast motion more.
     """
 
     whole: float = 0.02
@@ -40,6 +42,7 @@ class RegisterChecks:
     soft: float = 8e-4
     sure: float = 0.15
     missed: float = 5e-3
+    share: float = 0.1
 
 
 REGISTER = RegisterChecks()
@@ -47,14 +50,16 @@ REGISTER = RegisterChecks()
 
 @dataclass(frozen=True)
 class RegisterLaw:
-    """gain: assumed for each log; delay [s]; ramp [rad/s], infinite where no goal was fast enough to identify it;
-    minimum_duty; dead_zone [rad]; missed: median residual [rad of goal]; sd: standard errors by name."""
+    """gain: over the nominal one of each log; delay [s], of goals whose stamps run `rate` times as fast as those of positions;
+    ramp [rad/s], infinite where no goal was fast enough to identify it; minimum_duty; dead_zone [rad]; missed: median residual
+    [rad of goal]; sd: standard errors by name."""
 
     gain: float
     delay: float
     ramp: float
     minimum_duty: float
     dead_zone: float
+    rate: float
     missed: float
     sd: dict[str, float]
 
@@ -113,18 +118,19 @@ def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> Registe
     gain = float(np.median(slopes))
 
     def residuals(x: Array) -> Array:
-        delay, slowness, p, zone, k = x.tolist()
+        delay, slowness, p, zone, k, fast = x.tolist()
         out = []
         for log, rows in kept:
             steep = k * gain * log.gain
-            e = ramp_goals(log.time, log.goal, log.time - delay, 1.0 / max(slowness, 1e-6)) - log.position
+            at = log.time + fast * (log.time - log.time[0]) - delay
+            e = ramp_goals(log.time, log.goal, at, 1.0 / max(slowness, 1e-6)) - log.position
             law = np.sign(e) * steep * np.maximum(np.abs(e) - zone, 0.0) + p * np.tanh(e / c.soft)
             out.append((log.duty - np.clip(law, -1.0, 1.0))[rows] / steep)
         return np.asarray(np.concatenate(out) / c.error)
 
-    low, high = np.array([(-0.02, 0.3), (1e-3, 1.0), (0.0, 0.3), (0.0, 0.05), (0.3, 3.0)]).T
-    scale = np.array([0.01, 0.05, 0.01, 1e-3, 0.1])
-    begins = [np.array([d, 1.0 / v, c.duty, 1e-3, 1.0]) for d in c.delays for v in c.ramps]
+    low, high = np.array([(-0.02, 0.3), (1e-3, 1.0), (0.0, 0.3), (0.0, 0.05), (0.3, 3.0), (-0.05, 0.05)]).T
+    scale = np.array([0.01, 0.05, 0.01, 1e-3, 0.1, 0.003])
+    begins = [np.array([d, 1.0 / v, c.duty, 1e-3, 1.0, 0.0]) for d in c.delays for v in c.ramps]
     begins.sort(key=lambda x: float(np.log1p(residuals(x) ** 2).sum()))
     def slopes_of(x: Array) -> Array:
         return _differences(residuals, x, scale)
@@ -132,16 +138,18 @@ def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> Registe
     fits = [least_squares(residuals, x, jac=slopes_of, bounds=(low, high), loss="cauchy", x_scale=scale) for x in begins[:2]]
     fit = min(fits, key=lambda f: float(f.cost))
     missed = float(np.median(np.abs(fit.fun))) * c.error
-    if missed > c.missed:
+    behind = np.concatenate([np.abs(log.duty[rows]) / (fit.x[4] * gain * log.gain) for log, rows in kept])
+    if missed > max(c.missed, c.share * float(np.median(behind))):
         return None
     J = np.asarray(fit.jac, dtype=float)
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0))
-    delay, slowness, p, zone, k = fit.x.tolist()
+    delay, slowness, p, zone, k, fast = fit.x.tolist()
     ramp, sd = 1.0 / slowness, float(spread[1] / slowness**2)
     identified = sd < c.sure * ramp
     errors = {"gain": gain * float(spread[4]), "delay": float(spread[0]), "ramp": sd if identified else np.inf,
-              "minimum_duty": float(spread[2]), "dead_zone": float(spread[3])}
-    return RegisterLaw(gain * k, delay, ramp if identified else np.inf, p, zone, missed, errors)
+              "minimum_duty": float(spread[2]), "dead_zone": float(spread[3]),
+              "rate": float(spread[5])}
+    return RegisterLaw(gain * k, delay, ramp if identified else np.inf, p, zone, 1.0 / (1.0 + fast), missed, errors)
 
 
 def _differences(residuals: Callable[[Array], Array], x: Array, scale: Array) -> Array:

@@ -59,9 +59,11 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     _check_bounds(recording, checks)
     if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
-    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording)]
+    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording), *_no_reading(recording)]
     if len(time) < 3:
         return replace(recording, problems=tuple(problems))
+    if np.median(np.diff(time)) < checks.fast:  # what follows compares with the times in which servos answer
+        return replace(recording, problems=(*problems, *_clock(recording, checks)))
     exchanged = {j: text for j, text in reversed_roles(recording)
                  if _shift_of_equals(channels[f"goal.{j}"], channels[f"position.{j}"], checks) is None}
     problems += exchanged.values()
@@ -87,6 +89,12 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
     return as_logged(replace(mended.recording, problems=tuple(problems)))
+
+
+def _no_reading(r: Recording) -> list[str]:
+    """A line for each position without a reading in any row."""
+    read = {name: values for j in r.joints if (values := r.channels.get(name := f"position.{j}")) is not None}
+    return [f"{name}: holds no reading in any row" for name, values in read.items() if not np.isfinite(values).any()]
 
 
 def _check_bounds(r: Recording, c: LogChecks) -> None:
@@ -126,8 +134,8 @@ def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
         unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
         yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
     elif middle < c.fast:
-        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in "
-               f"{'minutes' if 60 * middle > c.fast else 'hours'}?")
+        unit = next((unit for unit, seconds in (("minutes", 60), ("hours", 3600)) if seconds * middle > c.fast), "another unit")
+        yield f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in {unit}?"
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))

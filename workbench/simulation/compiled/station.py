@@ -24,6 +24,7 @@ from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
 from workbench.simulation.compiled.structures import tables_of
 from workbench.simulation.compiled.tables import NotCoveredError, Tables
+from workbench.simulation.compiled.turns import compile_turns
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
@@ -64,7 +65,9 @@ def announced(play: Callable[[], T], kernel: object = run) -> T:
 
 
 def compile_station() -> None:
-    """Compiles the kernel of one robot, unless this machine keeps it for this checkout: plays a millisecond."""
+    """Compiles the kernel of one robot and the passes over its log, unless this machine keeps them for this checkout: plays a
+    millisecond."""
+    compile_turns()
     run_compiled(Job(puppy_model(), SimulationConfig(base="fixed", settle=1e-3), duration=1e-3, lead=0.0))
 
 

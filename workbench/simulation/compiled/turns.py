@@ -90,3 +90,12 @@ def joint_turns(turns: Array, rest: Array, frame: Array, parent: Ints, child: In
             out[k, j, 0] = angle
             back = (c, -s * axis[j, 0], -s * axis[j, 1], -s * axis[j, 2])
             out[k, j, 1], out[k, j, 2], out[k, j, 3] = rotation_vector(quat_product(relative, back))
+
+
+def compile_turns() -> None:
+    """Compiles these passes, unless this machine keeps them for this checkout: of one body at one frame."""
+    first, level, out = np.zeros(1, np.int64), np.array([[[1.0, 0.0, 0.0, 0.0]]]), np.empty((1, 1, 4))
+    axis = np.zeros((1, 3))
+    body_turns(first - 1, level[0], axis, np.zeros((1, 1)), level[0], first, np.empty((2, 4)), out)
+    turn_between(level, first, first, np.zeros(1), out)
+    joint_turns(level, level[0], level[0], first - 1, first, axis, out)

@@ -47,11 +47,12 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
 
 
 def _settle(figure: Figure) -> None:
-    """Lays the figure out once; the layout engine would do so again at each drawing, and move axes by a tenth of a pixel."""
+    """Lays the figure out once; the layout engine would do so again at each drawing, and move axes by a tenth of a pixel. With an
+    engine, even one that does nothing, a figure is drawn twice for a file."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)
 
 
 def _print_figure(figure: Figure, kind: str) -> bytes:

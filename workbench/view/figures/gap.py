@@ -22,6 +22,7 @@ from workbench.view.figures.style import (
     RECORDED,
     SIMULATED,
     STANCE,
+    grid_of,
     in_house_style,
     legend_above,
     new_figure,
@@ -115,8 +116,7 @@ def before_after(take: TakeReport, joint: str) -> Figure:
     low, high = _worst_stretch(take, joint)
     t = take.time
     use = (t >= low) & (t <= high)
-    figure = new_figure(10, 4.8)
-    top, strip = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.6])
+    figure, (top, strip) = grid_of(2, 1, 10, 4.8, between=0.15, sharex=True, height_ratios=[3, 1.6])
     recorded = _DEGREES * take.recorded.q[use, take.recorded.column(joint)]
     top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
     sigma = _DEGREES * take.sigma(joint)

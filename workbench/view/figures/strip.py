@@ -11,7 +11,7 @@ from workbench.recording.take import Take
 from workbench.robot.feet import tips
 from workbench.robot.model import RobotModel
 from workbench.types import Array
-from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, in_house_style, new_figure
+from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, grid_of, in_house_style
 from workbench.view.playback import Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 
@@ -39,9 +39,8 @@ def film_strip(
     heights = [_heights(film, ends) for film, *_ in films]
     low, high = min(h[0] for h in heights), max(h[1] for h in heights)
     reach = max(80 * shapes.height, 60 * (high - low), 2 + 100 * min(max(own, *others, 0.0), WIDEST * own))
-    figure = new_figure(12, 2.9)
-    grid = figure.subplots(1, instants, sharey=True)
-    for k, axes in enumerate(np.atleast_1d(grid), start=1):
+    figure, grid = grid_of(1, instants, 12, 2.9, aside=0.25, sharey=True)
+    for k, axes in enumerate(grid, start=1):
         axes.axhline(0, color=COMMAND, linewidth=1.0, zorder=1)
         middle = played.base_p[k, 0]
         for film, colour, label, alpha in films:
@@ -53,9 +52,8 @@ def film_strip(
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(f"{time[k]:.1f} s", fontsize=12)
         axes.set_xlabel("forward [cm]")
-    np.atleast_1d(grid)[0].set_ylabel("height [cm]")
-    handles, labels = np.atleast_1d(grid)[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=2)
+    grid[0].set_ylabel("height [cm]")
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="upper right", ncols=2)
     return figure
 
 

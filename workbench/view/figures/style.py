@@ -48,6 +48,8 @@ _RC: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "figure.facecolor": "white",
     "figure.dpi": 100,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
     "savefig.dpi": 144,
     "svg.fonttype": "path",
     "svg.hashsalt": "workbench",
@@ -95,17 +97,22 @@ def legend_above(axes: Axes) -> None:
 
 
 def panels(count: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """A figure of `count` panels in rows of `columns` that share their time axis; `height` of one row [inches]. Its margins are
-    fixed, as labels are as large in every such figure, and solving for them takes as long as drawing some of the curves."""
+    """A figure of `count` panels in rows of `columns` that share their time axis; `height` of one row [inches]."""
     rows = -(-count // columns)
-    tall = height * rows + 0.6
-    figure = new_figure(width, tall)
-    figure.set_layout_engine("none")
-    across = (width - LEFT - RIGHT - ASIDE * (columns - 1)) / columns
-    down = (tall - ABOVE - BELOW - BETWEEN * (rows - 1)) / rows
-    place = {"left": LEFT / width, "right": 1 - RIGHT / width, "bottom": BELOW / tall, "top": 1 - ABOVE / tall,
-             "wspace": ASIDE / across, "hspace": BETWEEN / down}
-    grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False, gridspec_kw=place).flat)
+    figure, grid = grid_of(rows, columns, width, height * rows + 0.6, sharex=True)
     for axes in grid[count:]:
         axes.set_axis_off()
     return figure, grid[:count]
+
+
+def grid_of(rows: int, columns: int, width: float, height: float, aside: float = ASIDE, between: float = BETWEEN, **subplots: Any
+            ) -> tuple[Figure, list[Axes]]:
+    """A figure [inches] with panels in rows, `aside` and `between` apart [inches]; subplots: as matplotlib's take it. Its margins
+    are fixed, as labels are as large in every such figure, and solving for them takes as long as drawing the curves."""
+    figure = new_figure(width, height)
+    figure.set_layout_engine(None)
+    across = (width - LEFT - RIGHT - aside * (columns - 1)) / columns
+    down = (height - ABOVE - BELOW - between * (rows - 1)) / rows
+    place = {"left": LEFT / width, "right": 1 - RIGHT / width, "bottom": BELOW / height, "top": 1 - ABOVE / height,
+             "wspace": aside / across, "hspace": between / down}
+    return figure, list(figure.subplots(rows, columns, squeeze=False, gridspec_kw=place, **subplots).flat)

@@ -6,15 +6,18 @@ import html
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from workbench.compare.metrics import displacement
 from workbench.compare.results import Comparison
-from workbench.gait.optimize import Optimized
 from workbench.identify.results.findings import Diagnosis
 from workbench.recording import Take
 from workbench.view.report.comparison import headline
+
+if TYPE_CHECKING:
+    from workbench.gait.optimize import Optimized
 
 SHOWN = 5
 """Joints of a take."""

@@ -189,7 +189,7 @@ def _table(table: Table) -> str:
 
 
 def _replay(replay: Replay) -> str:
-    packed = base64.b64encode(gzip.compress(read_text(replay.path).encode(), compresslevel=9, mtime=0)).decode()
+    packed = base64.b64encode(gzip.compress(read_text(replay.path).encode(), compresslevel=6, mtime=0)).decode()
     poster = "" if replay.poster is None else _image(replay.poster, replay.caption)
     label = escape(replay.caption or "3D replay")
     return (f'<figure class="replay"><div class="stage" data-label="{label}">{poster}'

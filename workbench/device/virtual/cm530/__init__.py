@@ -4,7 +4,7 @@ Needs `unicorn` (PyPI), which only the tests and the virtual robot use. One cycl
 interrupts do not nest, as the program sets no priorities (setting one is refused).
 """
 
-from workbench.device.virtual.cm530.board import Board, Wire
+from workbench.device.virtual.cm530.board import Board, Wire, check_image
 from workbench.device.virtual.cm530.processor import BoardError
 
-__all__ = ["Board", "BoardError", "Wire"]
+__all__ = ["Board", "BoardError", "Wire", "check_image"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import struct
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from functools import partial
 from workbench.device.virtual.bus import ServoBus
 from workbench.device.virtual.clock import SECOND, Clock
 from workbench.device.virtual.cm530.peripheral import Peripheral
-from workbench.device.virtual.cm530.processor import FLASH, RAM, RAM_BYTES, SYSTICK, BoardError, Processor
+from workbench.device.virtual.cm530.processor import FLASH, FLASH_BYTES, RAM, RAM_BYTES, SYSTICK, BoardError, Processor
 from workbench.device.virtual.cm530.system import (
     PIN_RESET,
     POWER_RESET,
@@ -28,6 +29,7 @@ APPLICATION = 0x08003000
 """Where the loader starts the program."""
 START_PIN, TALK_PIN, LISTEN_PIN = 3, 4, 5
 _LINE = SECOND * 10 // 57_600
+_FIRST_VECTORS = struct.Struct("<II")
 
 
 @dataclass
@@ -45,6 +47,18 @@ class Violation:
 
     time: int
     what: str
+
+
+def check_image(image: bytes) -> None:
+    """BoardError for bytes that cannot be the image of a program: too many for the flash, or not begun by a table of vectors with
+    the stack in memory and the start in the image."""
+    room = FLASH + FLASH_BYTES - APPLICATION
+    if not _FIRST_VECTORS.size <= len(image) <= room:
+        raise BoardError(f"{len(image)} bytes; expected {_FIRST_VECTORS.size} to {room}")
+    stack, start = _FIRST_VECTORS.unpack_from(image)
+    if not RAM < stack <= RAM + RAM_BYTES or not APPLICATION <= start - 1 < APPLICATION + len(image) or not start & 1:
+        raise BoardError(f"its first words are stack {stack:#010x} and start {start:#010x}; expected the image from "
+                         "`make firmware`, a .bin file")
 
 
 class Board:

@@ -80,7 +80,14 @@ class Processor:
         self.uc.emu_stop()
 
     def run(self, until: int) -> None:
-        """Lets the processor run, or sleep, until a time [ticks]."""
+        """Lets the processor run, or sleep, until a time [ticks]. BoardError where it locks up, as on a fault within a fault."""
+        try:
+            self._run(until)
+        except unicorn.UcError as e:
+            first = f"; before that {self.faults[0]}" if self.faults else ""
+            raise BoardError(f"the processor locked up at {self._pc & ~1:#010x} ({e}{first})") from None
+
+    def _run(self, until: int) -> None:
         clock = self.clock
         while clock.now < until:
             if clock.next_time <= clock.now:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -79,54 +80,67 @@ class Room(NamedTuple):
     lane_R: Array
 
 
-_SHARED = ("free", "parent", "path", "row", "group", "pull")
-"""Of a tree, the same in all lanes."""
+_OF_TREE = ("R", "p", "axis", "mass", "com", "inertia", "armature", "damping", "stiffness", "rest", "lower", "upper", "brake",
+            "brake_gain", "gravity")
+"""Numbers of a tree; the others are the same in all lanes."""
 _OF_SERVOS = ("zero", "gain", "margin", "punch", "full_torque", "back_emf", "coulomb", "derivative", "ramp", "lag", "most",
               "ceiling", "supply", "rubbing", "backwards", "bend")
 _BY_TERM = {"sag": 0.0, "sticking": 0.0, "speed": 1.0, "still": 0.0, "still_speed": 1.0, "lopsided": 0.0}
 """Numbers by term, and those of a term that changes nothing."""
 
 
-def room(*shape: int) -> Array:
-    """Zeros (*shape, LANES), placed as kernels need them."""
-    count = int(np.prod(shape)) * LANES
-    raw = np.zeros(count + LANES)
-    begin = (-raw.ctypes.data // raw.itemsize) % LANES
-    return raw[begin:begin + count].reshape(*shape, LANES)
+def _room(shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+    """Zeros (*shape, LANES) of each shape, placed as kernels need them."""
+    sizes = [math.prod(shape) * LANES for shape in shapes]
+    raw = np.zeros(sum(sizes) + LANES)
+    end, out = (-raw.ctypes.data // raw.itemsize) % LANES, []
+    for shape, size in zip(shapes, sizes):
+        begin, end = end, end + size
+        out.append(raw[begin:end].reshape(*shape, LANES))
+    return out
 
 
-def in_lanes(values: Sequence[Any]) -> Array:
-    """Arrays of one shape, up to LANES of them, side by side; the last one also in the lanes that are left over."""
-    first = np.asarray(values[0])
-    out = room(*first.shape)
-    for i, value in enumerate(values):
-        out[..., i] = value
-    out[..., len(values):] = np.asarray(values[-1])[..., None]
+def _in_lanes(robots: Sequence[Sequence[Array]]) -> list[Array]:
+    """Arrays of up to LANES robots, of the same shapes for each: each array of all robots side by side; the last robot also in
+    the lanes that are left over."""
+    out = _room([a.shape for a in robots[0]])
+    numbers = np.array([np.concatenate([a.ravel() for a in arrays]) for arrays in robots]).T
+    end = 0
+    for array in out:
+        begin, end = end, end + array.size // LANES
+        flat = array.reshape(-1, LANES)
+        flat[:, :len(robots)] = numbers[begin:end]
+        flat[:, len(robots):] = numbers[begin:end, -1:]
     return out
 
 
 def trees_in_lanes(trees: Sequence[Tree]) -> Tree:
     """Of one structure."""
-    numbers: dict[str, Any] = {name: in_lanes([getattr(t, name) for t in trees]) for name in Tree._fields if name not in _SHARED}
+    numbers: dict[str, Any] = dict(zip(_OF_TREE, _in_lanes([[getattr(t, name) for name in _OF_TREE] for t in trees])))
     return trees[0]._replace(**numbers)
 
 
 def servos_in_lanes(servos: Sequence[Servos]) -> LaneServos:
     """Of as many servos on the same joints, without tables."""
-    numbers = {name: in_lanes([getattr(s, name) for s in servos]) for name in _OF_SERVOS}
-    for name, nothing in _BY_TERM.items():
-        values = [getattr(s, name) for s in servos]
-        most = max(len(v) for v in values)
-        numbers[name] = in_lanes([np.concatenate([v, np.full((most - len(v), *v.shape[1:]), nothing)]) for v in values])
+    terms = {name: max(len(getattr(s, name)) for s in servos) for name in _BY_TERM}
+    numbers = _in_lanes([[*(getattr(s, name) for name in _OF_SERVOS), np.array([s.fade]),
+                          *(_lengthened(getattr(s, name), terms[name], nothing) for name, nothing in _BY_TERM.items())]
+                         for s in servos])
     return LaneServos(joint=servos[0].joint, terms=any(s.terms for s in servos), varies=any(s.varies for s in servos),
-                      lags=any(bool(s.lag.any()) for s in servos), fade=in_lanes([np.array([s.fade]) for s in servos]), **numbers)
+                      lags=any(bool(s.lag.any()) for s in servos), **dict(zip((*_OF_SERVOS, "fade", *_BY_TERM), numbers)))
+
+
+def _lengthened(rows: Array, count: int, by: float) -> Array:
+    """As many rows as `count`, those that are missing full of one number."""
+    missing = count - len(rows)
+    return np.concatenate([rows, np.full((missing, *rows.shape[1:]), by)]) if missing else rows
 
 
 def states_in_lanes(states: Sequence[State]) -> State:
     """That differ in numbers, but not in which servos are on or whether there was a step."""
-    numbers = ("q", "v", "reference", "goal", "lagging", "reach", "memory")
-    return State(base=states[0].base, on=states[0].on.copy(), stepped=states[0].stepped.copy(),
-                 **{name: in_lanes([getattr(s, name) for s in states]) for name in numbers})
+    names = ("q", "v", "reference", "goal", "lagging", "reach", "memory")
+    numbers = _in_lanes([[getattr(s, name) for name in names] for s in states])
+    return State(base=states[0].base, on=states[0].on.copy(), stepped=states[0].stepped.copy(), **dict(zip(names, numbers)))
 
 
 def state_of_lane(states: State, i: int) -> State:
@@ -144,8 +158,8 @@ def room_for(tree: Tree, servos: LaneServos) -> Room:
         "R": (n + 1, 3, 3), "p": (n + 1, 3), "S": (n, 6), "mass": (n + 1,), "moment": (n + 1, 3), "inertia": (n + 1, 6),
         "V": (n + 1, 6), "A": (n + 1, 6), "F": (n + 1, 6), "M": (n, n), "H": (n, n), "limit_v": (n, 2), "active": (groups,),
         "push": (m,), "motor": (m,), "relief": (m,)}
-    wide = {name: room(*shapes.get(name, (n,))) for name in Room._fields if name != "lane_R"}
-    return Room(lane_R=np.zeros((n + 1, 3, 3)), **wide)
+    names = [name for name in Room._fields if name != "lane_R"]
+    return Room(lane_R=np.zeros((n + 1, 3, 3)), **dict(zip(names, _room([shapes.get(name, (n,)) for name in names]))))
 
 
 Lost = NDArray[np.bool_]

@@ -74,8 +74,8 @@ def _in_step(plays: Sequence[Play]) -> Iterator[list[int]]:
     for k, (job, schedule) in enumerate(plays):
         tree, servos, shapes = job.machine
         if not tree.free and not len(servos.table_servo):
-            structure = id(tree.parent), id(tree.path), id(tree.group), id(shapes), servos.joint.tobytes()
-            kind = id(schedule), job.rows, structure, servos.terms  # terms have a servo that is off brake otherwise
+            structure = [a.tobytes() for a in (tree.parent, tree.path, tree.group, servos.joint, *shapes)]
+            kind = id(schedule), job.rows, servos.terms, *structure  # terms have a servo that is off brake otherwise
             groups.setdefault(kind, []).append(k)
     for group in groups.values():
         group.sort(key=lambda k: _terms(plays[k][0]))
