@@ -78,6 +78,14 @@ def _fail(out: Path, error: BaseException) -> None:
         raise error
 
 
+def _fill(out: Path) -> None:
+    with output_directory(out) as folder:
+        (folder / "a.txt").write_text("a")
+        (folder / "b.txt").write_text("b")
+        (folder / "sub").mkdir()
+        (folder / "sub/c.txt").write_text("c")
+
+
 @pytest.mark.parametrize(("made", "said"), [
     (lambda out: (out / "b.txt").mkdir(parents=True), "b.txt: cannot be written (a folder has this name)"),
     (lambda out: (out.mkdir(), (out / "sub").write_text("x")), "is a file)")])
@@ -85,11 +93,8 @@ def test_nothing_appears_where_one_name_is_taken(tmp_path, made, said):
     out = tmp_path / "out"
     made(out)
     before = sorted(out.rglob("*"))
-    with pytest.raises(InputError) as caught, output_directory(out) as folder:
-        (folder / "a.txt").write_text("a")
-        (folder / "b.txt").write_text("b")
-        (folder / "sub").mkdir()
-        (folder / "sub/c.txt").write_text("c")
+    with pytest.raises(InputError) as caught:
+        _fill(out)
     assert said in str(caught.value)
     assert sorted(out.rglob("*")) == before
     assert not list(tmp_path.glob(".workbench-*"))

@@ -141,7 +141,7 @@ def test_axes_of_a_c3d_that_cannot_be_are_refused(tmp_path: Path, x: str, y: str
 def test_a_rate_that_no_camera_has_is_refused(tmp_path: Path, rate: float) -> None:
     path = tmp_path / "a.c3d"
     path.write_bytes(_c3d(path).replace(struct.pack("<f", 100.0), struct.pack("<f", rate)))
-    with pytest.raises(InputError, match="a C3D file (with POINT:RATE .* expected 0.1 to 100000 frames|that is damaged$)"):
+    with pytest.raises(InputError, match=r"a C3D file (with POINT:RATE .* expected 0.1 to 100000 frames|that is damaged$)"):
         read_recording(path)
 
 
@@ -151,7 +151,7 @@ def test_a_c3d_that_was_cut_is_refused(tmp_path: Path) -> None:
     assert len(read_recording(path).time) == 60
     for lost in (600, 2000, 3000):
         path.write_bytes(whole[:-lost])
-        with pytest.raises(InputError, match="a C3D file that is (cut: it holds [0-9]+ of 60 frames|damaged)"):
+        with pytest.raises(InputError, match=r"a C3D file that is (cut: it holds [0-9]+ of 60 frames|damaged)"):
             read_recording(path)
 
 
