@@ -197,7 +197,8 @@ effects of a robot; pass it with `--model` to any command that simulates, export
 load it with `workbench.MakeStation(workbench.load_model("model.yaml"))`. To [add an effect](extending.md#an-effect), write one
 file in your own package.
 
-*Typical* is the size from which an effect is noticeable on a small robot; searches start there.
+*Typical* is the size from which an effect is noticeable on a small robot; searches start there. A range from *−nominal* on is
+that of an effect that is added to a constant of the servo, and can also take it away ([formats](formats.md#7-effects)).
 
 Symbols: q, ω: angle and speed of the servo's joint; q_link: angle of its link; τ: torque; e, d, duty, slope, punch: defined by
 [the servo law](formats.md#4-nominal-servo-law-servoyaml), as are the duty torque τ_duty, the back-EMF torque τ_emf, and the
@@ -283,7 +284,8 @@ def _row(p: Parameter) -> str:
     kind = " (three numbers)" if p.vector else ""
     optional = ", optional" if p.option else ""
     unit = p.unit if p.unit not in ("", "1") else "–"
-    return f"| `{p.name}`{kind}{optional} | {unit} | {p.low:g} to {p.high:g} | {p.typical:g} |"
+    low = "−nominal" if p.adds_to else f"{p.low:g}"  # the servo's own constant
+    return f"| `{p.name}`{kind}{optional} | {unit} | {low} to {p.high:g} | {p.typical:g} |"
 
 
 def _typical(effect: Effect) -> dict[str, float | tuple[float, float, float]]:

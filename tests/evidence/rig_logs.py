@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +22,12 @@ NOISE = 1.5e-3
 
 
 def record(folder: Path, effects: Sequence[EffectSpec] = (), seed: int = 0, beside: float = 0.0, faster: float = 1.0,
-           **servo: float) -> Session:
+           told: Mapping[str, float] | None = None, **servo: float) -> Session:
     """A session of three logs of 3 s, one a gain, of a rig with other physics than its servo.yaml says. beside: RMS [rad] of what
-    lies on top, smooth and no physics. faster: by which the goals move faster than usual."""
+    lies on top, smooth and no physics. faster: by which the goals move faster than usual. told: constants of servo.yaml that
+    differ from SERVO."""
     (folder / "rig.sdf").write_text(SDF.format(length=0.1, mass=0.5))
-    (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO))
+    (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO | dict(told or {})))
     takes = [{"name": f"gain {g:g}", "recording": f"{g:g}.csv", "base": "fixed", "servos": {"proportional_gain": g}}
              for g in GAINS]
     (folder / "session.yaml").write_text(yaml.safe_dump(

@@ -27,6 +27,25 @@ def test_load_friction_is_named_with_its_family(tmp_path):
     assert load_model(tmp_path / "out" / "model.yaml").effects == told.diagnosis.model.effects
 
 
+def test_a_friction_far_below_the_nominal_one_is_named_and_one_as_large_is_not(tmp_path):
+    """Of 0.16 N m, the recalibration reaches 0.036 N m, three standard deviations away."""
+    for hidden, folder in ((0.013, tmp_path / "less"), (0.16, tmp_path / "as told")):
+        folder.mkdir()
+        told = diagnose_session(record(folder, told={"coulomb_friction": 0.16}, coulomb_friction=hidden), n_jobs=1).diagnosis
+        named = {f.effect: f for f in told.findings if f.confidence > 0.5}
+        if hidden == 0.16:
+            assert not named
+            continue
+        assert set(named) == {"coulomb_friction"}
+        changed = {r.number: r.value - r.nominal for r in told.recalibrated}
+        less = named["coulomb_friction"].parameters["torque"].value
+        assert less < -0.03
+        assert less + changed["coulomb_friction"] == pytest.approx(-0.147, abs=0.004)
+        assert "less dry friction" in named["coulomb_friction"].evidence
+        told.save(folder / "out")
+        assert load_model(folder / "out" / "model.yaml").effects == told.model.effects
+
+
 def test_a_weaker_motor_within_what_is_known_is_recalibrated_and_no_finding(tmp_path):
     told = diagnose_session(record(tmp_path, supply_voltage=6.8), n_jobs=1)
     assert all(f.confidence < 0.5 for f in told.diagnosis.findings)

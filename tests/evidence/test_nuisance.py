@@ -8,11 +8,11 @@ import yaml
 
 from tests.evidence.linear import JOINT, candidate
 from tests.servo_rig import rig_model
-from workbench.effects.base import Registers
+from workbench.effects.registers import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
-from workbench.identify.evidence.hypothesis import ZERO, Uncertain, start
+from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain, start
 from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.recalibration import list_changes
@@ -76,6 +76,15 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     (said, other) = list_changes(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
     assert (said.number, other.number) == ("back_emf", "coulomb_friction")
     assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
+
+
+def test_all_numbers_recalibrated_as_far_as_they_go_are_still_those_of_a_servo(tmp_path):
+    model = rig_model(tmp_path, load_servo_constants(written(tmp_path)))
+    numbers = uncertain_numbers(model, "j", False)
+    for signs in (1.0, -1.0):
+        apart = {n: signs * FAR * (-1.0 if n.name == "back_emf" else 1.0) for n in numbers}
+        servo = recalibrate(model, apart).servo("j")
+        assert servo.no_load_speed == pytest.approx(200.0 if signs > 0 else 19.0 * np.exp(-2 * 1.5))
 
 
 def test_a_number_is_known_by_its_joint_and_name():

@@ -53,6 +53,25 @@ def test_two_effects_are_named_with_their_sizes():
     assert np.sqrt(np.diag(p.best.covariance(found.region, OPTIONS)))[-1] < 0.1
 
 
+class Held(Linear):
+    """Dry friction holds the joint: more of it changes nothing, less does the opposite of what more would do."""
+
+    def left(self, h):
+        sizes = [-x * c.less if c.name == "coulomb_friction" else x for c, x in h.sizes()]
+        return super().left(h.at(np.concatenate([h.z, *sizes])))
+
+
+def test_a_nominal_friction_that_is_too_large_is_named_even_if_it_holds_the_joint():
+    r = robot({"coulomb_friction": -3.5})
+    both = replace(r.regions[0].candidates[0], lowest=(-0.15,)).one_way()
+    assert [c.less for c in both] == [False, True]
+    of = replace(r.regions[0], candidates=(*both, *r.regions[0].candidates[1:]))
+    _, _, p = searched(Held(**{**vars(r), "regions": (of,)}))
+    ((c, x),) = p.best.hypothesis.sizes()
+    assert c.values(x) == pytest.approx([-3.5 * 0.03], rel=0.05)
+    assert p.named["coulomb_friction", ("j",)] > 0.9
+
+
 class Coarse(Linear):
     """At a coarse step dry friction does a third more than it does."""
 

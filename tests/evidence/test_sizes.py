@@ -26,6 +26,34 @@ def test_one_in_a_hundred_is_beyond_what_the_effect_says(name, neutral, beyond):
     assert quad(lambda v: np.exp(prior.log(np.array([v]))), 0.0, np.inf)[0] == pytest.approx(1.0, rel=1e-3)
 
 
+def test_friction_adds_to_a_constant_or_takes_from_it_as_far_as_that_goes():
+    c = Candidate.of(KNOWN["coulomb_friction"], ("j",), (0.0,), lowest=(-0.15,))
+    more, less = c.one_way()
+    for x, expected in (([2.0], 0.06), ([-1.0], 0.0)):
+        assert more.values(x) == pytest.approx([expected])
+        assert less.values(x) == pytest.approx([-expected])
+    assert [float(b[0]) for b in less.bounds()] == pytest.approx([0.0, 5.0])
+    assert less.values([9.0]) == [-0.15]
+    assert less.key == more.key
+    assert Prior.of(start(()).with_effect(less, np.ones(1)), EvidenceOptions()).one_sided.all()
+    assert c.values([-2.0]) == pytest.approx([-0.06])
+
+
+@pytest.mark.parametrize("nominal", [0.0, 0.001])
+def test_a_constant_too_small_to_be_noticed_is_not_taken_away(nominal):
+    c = Candidate.of(KNOWN["coulomb_friction"], ("j",), (0.0,), lowest=(-nominal,))
+    (more,) = c.one_way()
+    assert more.bounds()[0] == [0.0]
+
+
+def test_load_friction_that_takes_from_the_nominal_one_keeps_its_sign_with_options():
+    c = Candidate.of(KNOWN["load_friction"], ("j",), (0.0, 0.0, 20.0, 0.0), lowest=(-0.3, 0.0, 0.5, 0.0))
+    less = c.one_way()[1].with_options(("static",))
+    assert less.less
+    assert less.values([1.0, 1.0, 0.0]) == pytest.approx([-0.15, 0.15, 20.0])
+    assert less.values([9.0, -1.0, 0.0]) == pytest.approx([-0.3, 0.0, 20.0])
+
+
 def test_twelve_degrees_of_play_cost_more_than_where_nobody_says_what_is_usual():
     (_, play), (_, soft) = prior_of("backlash", 0.0), prior_of("joint_compliance", np.inf)
     cost = [p.log(np.array([1.0])) - p.log(np.array([12.0])) for p in (play, soft)]

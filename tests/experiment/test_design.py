@@ -125,6 +125,14 @@ def test_only_what_differs_adapts(arm):
     assert pair.a.move(np.array([-100.0])).model.effects[1].parameters["ratio"] == 0.05, "as far as is possible"
 
 
+def test_a_rival_takes_away_no_more_friction_than_there_is(arm):
+    nominal = arm.servo("one").coulomb_friction
+    less = arm.with_effect(EffectSpec("coulomb_friction", ("one",), {"torque": -0.5 * nominal}))
+    rival = Pair.of(less, arm).a
+    for x, torque in ((-200.0, -nominal), (200.0, 1.5)):
+        assert rival.move(np.array([x])).model.effects[0].parameters["torque"] == pytest.approx(torque)
+
+
 def test_a_flatter_law_and_a_softer_joint_are_told_apart(arm, tmp_path):
     rivals = [(arm.with_effect(EffectSpec("servo_gain", ("two",), {"ratio": 0.5})),
                arm.with_effect(EffectSpec("joint_compliance", ("two",), {"stiffness": 6.0})))]

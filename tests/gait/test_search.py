@@ -210,6 +210,18 @@ def test_a_diagnosed_models_posterior_is_drawn(machine, tmp_path):
     assert 0.1 < np.std(gaps) < 0.3
 
 
+def test_less_friction_than_nominal_is_drawn_down_to_none(machine, tmp_path):
+    nominal = machine.model.servo("flm").coulomb_friction
+    model = machine.model.with_effect(EffectSpec("coulomb_friction", ("flm",), {"torque": -0.8 * nominal}))
+    posterior = Posterior(("coulomb_friction(flm).torque",), np.array([-0.8 * nominal]), np.array([[(0.3 * nominal)**2]]))
+    draws = load_ensemble(posterior=posterior).draws(model, 30, 1, tmp_path)
+    torques = [e.parameters["torque"] for d in draws for e in d.effects if e.effect == "coulomb_friction"]
+    assert len(torques) == 30
+    assert min(torques) == -nominal
+    assert max(torques) < 0.0
+    assert -nominal < np.median(torques) < -0.5 * nominal
+
+
 @pytest.mark.parametrize(("text", "said"), [
     ("format: 2", "format: expected 1"), ("format: 1\nfriction: {low: 0.5}", "friction.high: is missing"),
     ("format: 1\nfriction: {low: 0.5, high: 0.1}", "friction.high: expected at least 0.5"),

@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from tests.gap_sessions import record_arm, session_content, write_session
+from tests.gap_sessions import SERVO, record_arm, session_content, write_session
 from workbench.cli.main import main
 from workbench.cli.memory import rollout_memory
 from workbench.compare.session import load_session
@@ -33,6 +33,31 @@ def test_what_is_too_slight_for_a_name_and_does_not_show_on_unseen_stretches_is_
     assert [(g.where, g.take) for g in said.gap] == [(("three",), "wave")]
     assert said.findings == said.unexplained == ()
     assert said.verdict == "no_gap"
+
+
+def with_friction_by_its_files(folder, friction):
+    """Writes the arm's servo.yaml, in which all joints have this Coulomb friction [N m]."""
+    (folder / "servo.yaml").write_text(SERVO.replace("coulomb_friction: 0.06", f"coulomb_friction: {friction}"))
+
+
+def test_a_nominal_friction_that_is_too_large_is_named_as_less_friction(tmp_path):
+    with_friction_by_its_files(tmp_path, 0.16)
+    record_arm(tmp_path, friction=0.06)
+    said = diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1).diagnosis
+    (finding,) = said.findings
+    assert (finding.effect, finding.where) == ("coulomb_friction", ("three",))
+    assert finding.parameters["torque"].value == pytest.approx(-0.1, abs=0.015)
+    assert finding.parameters["torque"].low < -0.1 < finding.parameters["torque"].high
+    assert "less dry friction" in finding.evidence
+    said.save(tmp_path / "out")
+    assert load_model(tmp_path / "out" / "model.yaml").effects == said.model.effects
+
+
+def test_a_robot_with_its_large_nominal_friction_has_no_gap(tmp_path):
+    with_friction_by_its_files(tmp_path, 0.16)
+    record_arm(tmp_path, friction=0.16)
+    said = diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1).diagnosis
+    assert (said.verdict, said.findings) == ("no_gap", ())
 
 
 def test_a_take_too_short_to_conclude_from_says_so(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,10 +59,30 @@ class Physics:
 
 def resolve(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
     """Each effect of a model with its spec and its values in SI, checked; InputError names the problem."""
-    for spec in model.effects:
+    for k, spec in enumerate(model.effects):
         effect = effect_named(spec.effect)
         check_places(effect, spec, model)
-        yield effect, spec, si_values(effect, spec)
+        lowest = effect.lowest(model.with_effects(model.effects[:k]), spec.where) if _takes_away(effect, spec) else ()
+        yield effect, spec, si_values(effect, spec, lowest)
+
+
+def add_possible(model: RobotModel, specs: Sequence[EffectSpec]) -> RobotModel:
+    """The model with more effects, none of which takes away more of a constant than is there: a search changes both at once."""
+    effects = list(model.effects)
+    for spec in specs:
+        effect = effect_named(spec.effect)
+        if _takes_away(effect, spec):
+            lowest = effect.lowest(model.with_effects(effects), spec.where)
+            least = {p.name: low for p, low in zip(effect.parameters, lowest)}
+            spec = replace(spec, parameters={
+                name: v if isinstance(v, tuple) else max(v, least[name]) for name, v in spec.parameters.items()})
+        effects.append(spec)
+    return model.with_effects(effects)
+
+
+def _takes_away(effect: Effect, spec: EffectSpec) -> bool:
+    """Whether a value is below its parameter's range, so that it has to take away from a constant."""
+    return any(isinstance(v := spec.parameters.get(p.name), (int, float)) and v < p.low for p in effect.parameters)
 
 
 def law_of(model: RobotModel) -> ServoLaw:

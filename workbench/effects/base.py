@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.effects.registers import Registers
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
@@ -58,7 +59,8 @@ class Parameter:
     then neutral. resolution: smallest standard deviation that any recording can give, because models are uncertain by that much.
     option: name of the optional part of the effect to which it belongs; empty: it is always given. seldom_beyond: value that one
     in a hundred servos (or robots) with the effect exceeds (for a vector, its length), with the reason in a comment; priors and
-    reach follow from it. logarithmic: a ratio whose size is its logarithm, so that 2 and 1/2 are equally large.
+    reach follow from it. logarithmic: a ratio whose size is its logarithm, so that 2 and 1/2 are equally large. adds_to: constant
+    of the servo (number of `ServoConstants`, in SI) to which it is added, and which it can take away (`Effect.lowest`).
     """
 
     name: str
@@ -74,6 +76,7 @@ class Parameter:
     option: str = ""
     seldom_beyond: float = math.nan
     logarithmic: bool = False
+    adds_to: str = ""
 
     def typical_beside(self, neutral: float) -> float:
         """The typical value. If it replaces a nominal value, it is lower than usual (a weak supply, a slippery floor); if the
@@ -84,14 +87,6 @@ class Parameter:
     def distance(self, value: float, neutral: float) -> float:
         """Distance of a value from neutral; for a ratio, the absolute value of its logarithm."""
         return abs(math.log(value / neutral)) if self.logarithmic else abs(value - neutral)
-
-
-@dataclass(frozen=True)
-class Registers:
-    """Readings of the servos' registers in one log, NaN where there are none. duty: by joint, (N,); voltage (N,) [V], or None."""
-
-    duty: Mapping[str, Array]
-    voltage: Array | None = None
 
 
 class Effect:
@@ -161,6 +156,18 @@ class Effect:
         """The values, in the units of docs/formats.md, at which the effect vanishes: infinity for a stiffness or a ceiling, the
         typical value for a parameter that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
+
+    def lowest(self, model: RobotModel, where: tuple[str, ...]) -> tuple[float, ...]:
+        """The smallest possible value of each parameter at these places, in the units of docs/formats.md: `Parameter.low`, less
+        the constant to which it is added, with the model's own effects of this name; the smallest of several joints."""
+        own = [e for e in model.effects if e.effect == self.name]
+
+        def constant(p: Parameter, joint: str) -> float:
+            added = (e.parameters.get(p.name, 0.0) for e in own if joint in (e.where or model.joints))
+            return float(getattr(model.servo(joint), p.adds_to)) / p.si + sum(v for v in added if not isinstance(v, tuple))
+
+        return tuple(p.low - (min(constant(p, joint) for joint in where or model.joints) if p.adds_to else 0.0)
+                     for p in self.parameters)
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         """The values at which the effect `name` (`reduces_to`, or one of `equivalent_to`) acts nearly the same way at the same
@@ -236,13 +243,6 @@ class Effect:
         return None
 
 
-def mean_of_logs(values: Sequence[float], least: float) -> tuple[float, float] | None:
-    """Mean of the logs' values, and its standard error, at least `least`; None for fewer than two logs."""
-    if len(values) < 2:
-        return None
-    return float(np.mean(values)), max(float(np.std(values, ddof=1) / math.sqrt(len(values))), least)
-
-
 def scalar(spec: EffectSpec, name: str) -> float:
     """A parameter that is one number, in the unit of docs/formats.md."""
     value = spec.parameters[name]
@@ -250,11 +250,11 @@ def scalar(spec: EffectSpec, name: str) -> float:
     return value
 
 
-def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
-    """Scalar parameters of a spec in SI; parameters of omitted optional parts have their neutral value. InputError names a
-    parameter that is missing, unknown, or out of range."""
+def si_values(effect: Effect, spec: EffectSpec, lowest: Sequence[float] = ()) -> dict[str, float]:
+    """Scalar parameters of a spec in SI; parameters of omitted optional parts have their neutral value. lowest: by parameter, of
+    `Effect.lowest`; empty: `Parameter.low`. InputError names a parameter that is missing, unknown, or out of range."""
     out: dict[str, float] = {}
-    for p in effect.parameters:
+    for p, low in zip(effect.parameters, lowest or [p.low for p in effect.parameters], strict=True):
         if p.name not in spec.parameters:
             if p.option:
                 out[p.name] = (p.typical if p.shapes else 0.0) * p.si
@@ -265,8 +265,8 @@ def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
             wanted = "three numbers" if p.vector else "one number"
             raise InputError(None, f"effect '{spec.effect}': '{p.name}': expected {wanted}")
         for v in value if isinstance(value, tuple) else (value,):
-            if not p.low <= v <= p.high:
-                raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {v:g} {p.unit}; expected {p.low:g} to {p.high:g}")
+            if not low <= v <= p.high and not math.isclose(v, low):  # which was computed in other units
+                raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {v:g} {p.unit}; expected {low:g} to {p.high:g}")
         if isinstance(value, tuple):
             out |= {f"{p.name}.{i}": v * p.si for i, v in enumerate(value)}
         else:

@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from workbench.effects.base import Effect, Estimator, Family, Layer, Parameter, Place
 from workbench.files import InputError
+from workbench.robot import ServoConstants
 
 _WORDS = {"layer": Layer, "family": Family, "estimator": Estimator}
 HOOKS = tuple(name for name, value in vars(Effect).items() if callable(value) and not name.startswith("_"))
@@ -40,6 +41,8 @@ def _problems(effect: Effect) -> Iterator[str]:
         if not p.low <= p.typical <= p.high or p.low == p.high or not p.si:
             yield (f"parameter '{p.name}': expected low <= typical <= high, low < high, si not 0; got low {p.low:g}, "
                    f"typical {p.typical:g}, high {p.high:g}, si {p.si:g}")
+        if p.adds_to and not isinstance(getattr(ServoConstants(), p.adds_to, None), (int, float)):
+            yield f"parameter '{p.name}': adds_to: expected a number of ServoConstants, got '{p.adds_to}'"
     if len({p.name for p in effect.parameters}) < len(effect.parameters):
         yield "parameters: expected different names"
 

@@ -18,7 +18,7 @@ from workbench.servo import ServoLaw
 
 
 class ServoConstant(Effect):
-    """The first parameter is added to a field of `ServoLaw`, multiplies it, or limits it from above."""
+    """The first parameter is added to a field of `ServoLaw`, which stays non-negative, multiplies it, or limits it from above."""
 
     layer = "actuator"
     places = ("joint",)
@@ -29,8 +29,19 @@ class ServoConstant(Effect):
         """Changes the constant at the effect's joints only."""
         constant, by = getattr(law, self.field).copy(), values[self.parameters[0].name]
         before = constant[columns]
-        constant[columns] = {"add": before + by, "multiply": before * by, "at most": np.minimum(before, by)}[self.how]
+        after = {"add": np.maximum(before + by, 0.0), "multiply": before * by, "at most": np.minimum(before, by)}
+        constant[columns] = after[self.how]
         return replace(law, **{self.field: constant})
+
+
+def more_or_less(value: float) -> str:
+    """"more", or "less" for a negative value."""
+    return "less" if value < 0 else "more"
+
+
+def above_or_below(value: float) -> str:
+    """"above", or "below" for a negative value."""
+    return "below" if value < 0 else "above"
 
 
 def any_proportional(model: RobotModel) -> bool:

@@ -58,13 +58,14 @@ class Rival:
             spec = self.model.effects[i]
             effect = effect_named(spec.effect)
             neutral = iter(effect.neutral(self.model))
-            for p in effect.parameters:
+            lowest = effect.lowest(self.model.with_effects([e for k, e in enumerate(self.model.effects) if k != i]), spec.where)
+            for p, low in zip(effect.parameters, lowest):
                 at_neutral = [next(neutral) for _ in range(3 if p.vector else 1)]
                 if p.name not in spec.parameters:
                     continue
                 given = spec.parameters[p.name]
                 for v, n in zip(given if isinstance(given, tuple) else (given,), at_neutral):
-                    out.append(_Number(float(v), p.low, p.high, p.typical_beside(n), math.inf if p.shapes else n, p.vector))
+                    out.append(_Number(float(v), low, p.high, p.typical_beside(n), math.inf if p.shapes else n, p.vector))
         return out
 
 

@@ -176,18 +176,18 @@ def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Gene
     known_well = np.isfinite(np.diag(posterior.covariance))  # what the data say nothing about stays at its mean
     covariance = np.where(np.outer(known_well, known_well), posterior.covariance, 0.0)
     values = iter(rng.multivariate_normal(np.asarray(posterior.mean), covariance, method="eigh").tolist())
-    effects = []
+    drawn = model.with_effects(())
     for spec in model.effects:
-        known = {p.name: p for p in effect_named(spec.effect).parameters}
-        drawn: dict[str, Any] = {}
+        effect = effect_named(spec.effect)
+        ends = {p.name: (low, p.high) for p, low in zip(effect.parameters, effect.lowest(drawn, spec.where))}
+        numbers: dict[str, Any] = {}
         for name, value in spec.parameters.items():
-            p = known[name]
             if isinstance(value, tuple):
-                drawn[name] = tuple(float(np.clip(next(values), p.low, p.high)) for _ in value)
+                numbers[name] = tuple(float(np.clip(next(values), *ends[name])) for _ in value)
             else:
-                drawn[name] = float(np.clip(next(values), p.low, p.high))
-        effects.append(replace(spec, parameters=drawn))
-    return model.with_effects(effects)
+                numbers[name] = float(np.clip(next(values), *ends[name]))
+        drawn = drawn.with_effects((*drawn.effects, replace(spec, parameters=numbers)))
+    return drawn
 
 
 def _inside(model: RobotModel, rng: np.random.Generator) -> tuple[float, float, float]:

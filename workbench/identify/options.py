@@ -176,6 +176,8 @@ class FitOptions:
 
     least_move: float = 0.3
     """Least magnitude to which a finite difference is relative, in typical sizes."""
+    least_taken: float = 0.25
+    """Least size, in typical ones, of a nominal constant without which the servo is simulated, too: less is not noticeable."""
     vector_move: float = 0.5
     """The same of one of a vector's numbers, in its length."""
     most_doubled: float = 1000.0

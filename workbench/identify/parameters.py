@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -27,7 +27,8 @@ class Candidate:
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
     that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
     numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the formats page's
-    units, by number; empty: they are not told."""
+    units, by number; empty: they are not told. lowest: `Effect.lowest` of all the effect's parameters; empty: `Parameter.low`.
+    less: whether it only takes from a constant; its size is 1 where a typical amount is gone."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -37,15 +38,18 @@ class Candidate:
     reach: float = math.inf
     options: tuple[str, ...] = ()
     spread: tuple[float, ...] = ()
+    lowest: tuple[float, ...] = ()
+    less: bool = False
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
-           fixed: Sequence[bool] | None = None, options: tuple[str, ...] = ()) -> Self:
-        """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own."""
+           fixed: Sequence[bool] | None = None, options: tuple[str, ...] = (), lowest: tuple[float, ...] = ()) -> Self:
+        """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own. lowest: as of the
+        class."""
         given = [(p, n) for p, n in zip(_by_number(effect.parameters), neutral) if p.option in ("", *options)]
         own = tuple(p.typical_beside(n) for p, n in given)
         return cls(effect, where, tuple(n for _, n in given), tuple(typical or own), tuple(fixed or (False,) * len(own)),
-                   options=options)
+                   options=options, lowest=lowest)
 
     @property
     def name(self) -> str:
@@ -78,6 +82,37 @@ class Candidate:
         return _by_number(self.given)
 
     @cached_property
+    def least(self) -> list[float]:
+        """The smallest possible value of each number, in the units of docs/formats.md."""
+        lowest = dict(zip((p.name for p in self.effect.parameters), self.lowest))
+        return [lowest.get(p.name, p.low) for p in self.parameters]
+
+    @cached_property
+    def takes_away(self) -> Mask:
+        """Which sizes may be noticeably negative, because the effect can take away a constant of this robot."""
+        far = [low < p.low and p.low - low >= FIT.least_taken * abs(t - n)
+               for p, low, n, t in zip(self.parameters, self.least, self.neutral, self.typical)]
+        return np.array([x for x, fixed in zip(far, self.fixed) if not fixed], dtype=bool)
+
+    @cached_property
+    def most(self) -> list[float]:
+        """The largest possible value of each number, in the units of docs/formats.md."""
+        return [n if self.less and p.adds_to else p.high for p, n in zip(self.parameters, self.neutral)]
+
+    def one_way(self) -> list[Candidate]:
+        """The candidate as it adds to a constant and, where that is possible, as it takes from it: two hypotheses with sizes of
+        one sign each."""
+        more = replace(self, lowest=())
+        typical = tuple(2 * n - t if p.adds_to else t for p, n, t in zip(self.parameters, self.neutral, self.typical))
+        return [more, replace(self, typical=typical, less=True)] if self.takes_away.any() else [more]
+
+    def with_options(self, options: Iterable[str]) -> Candidate:
+        """The same with these options; initially the numbers that make the effect are zero, those that shape it are typical."""
+        neutral = tuple(p.typical if p.shapes else 0.0 for p in self.effect.parameters)
+        c = Candidate.of(self.effect, self.where, neutral, options=tuple(sorted({*options})), lowest=self.lowest)
+        return c.one_way()[-1] if self.less else c
+
+    @cached_property
     def size(self) -> int:
         """How many numbers are fitted."""
         return self.fixed.count(False)
@@ -104,7 +139,8 @@ class Candidate:
         """Parameters in the units of docs/formats.md, limited to their bounds; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
-        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+        ends = zip(self.least, self.most)
+        for p, (low, high), n, t, fixed in zip(self.parameters, ends, self.neutral, self.typical, self.fixed):
             size = 1.0 if fixed else next(sizes)
             if fixed:
                 value = t
@@ -112,7 +148,7 @@ class Candidate:
                 value = t / max(size, t / p.high)
             else:
                 value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
-            out.append(float(min(max(value, p.low), p.high)))
+            out.append(float(min(max(value, low), high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:
@@ -124,7 +160,8 @@ class Candidate:
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of the sizes x, lower and upper."""
         low, high = [], []
-        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+        limits = zip(self.least, self.most)
+        for p, (least, most), n, t, fixed in zip(self.parameters, limits, self.neutral, self.typical, self.fixed):
             if fixed:
                 continue
             if math.isinf(n):
@@ -134,7 +171,7 @@ class Candidate:
             else:
                 near, far = (n * math.exp(-self.reach), n * math.exp(min(self.reach, 100.0))) if p.logarithmic else (
                     n - self.reach, n + self.reach)
-                ends = [_size(p, end, n, t) for end in (max(p.low, near), min(p.high, far))]
+                ends = [_size(p, end, n, t) for end in (max(least, near), min(most, far))]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)

@@ -38,7 +38,8 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Co
             if effect.point_mass:
                 out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))
             else:
-                out.append(replace(Candidate.of(effect, where, neutral), reach=effect.reach(sdf, model, where)))
+                c = Candidate.of(effect, where, neutral, lowest=effect.lowest(model, where))
+                out.append(replace(c, reach=effect.reach(sdf, model, where)))
     return out
 
 

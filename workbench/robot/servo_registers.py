@@ -86,7 +86,7 @@ def _effect(joint: str, key: str, nominal: float, found: float) -> EffectSpec | 
         return EffectSpec("servo_gain", (joint,), {"ratio": nominal / found})
     if key == "proportional_gain":
         return EffectSpec("servo_gain", (joint,), {"ratio": found / nominal})
-    if key == "compliance_margin" and found > nominal:
+    if key == "compliance_margin":
         return EffectSpec("dead_band", (joint,), {"margin": math.degrees((found - nominal) * COUNT)})
     return None
 

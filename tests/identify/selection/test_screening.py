@@ -54,6 +54,20 @@ def test_a_response_is_not_believed_far_beyond_where_it_was_looked_at():
     assert linearised_estimate(c, r0, probes, slips, SCREENING.far_walking)[0] == pytest.approx([2.0])
 
 
+def test_a_constant_that_may_be_too_large_is_simulated_without_it_and_on_a_walk_its_response_is_extended():
+    c = Candidate.of(known_effects()["coulomb_friction"], ("flm",), (0.0,), lowest=(-0.06,))
+    assert [c.values(p)[0] for p in scan(c, (1.0, 4.0), False)] == pytest.approx([0.03, 0.12, -0.06])
+    probes = scan(c, (1.0,), True)
+    assert [c.values(p)[0] for p in probes] == pytest.approx([0.03])
+    more = np.linspace(-1.0, 1.0, 20)
+    x, gain = linearised_estimate(c, 1.5 * more, probes, [2.5 * more], SCREENING.far_walking)
+    assert x == pytest.approx([-1.5])
+    assert gain == pytest.approx(2.25 * more @ more)
+    held = scan(c, (1.0, 4.0), False)
+    x, gain = linearised_estimate(c, more, held, [more, more, 0.2 * more], SCREENING.far)  # more of it changes nothing
+    assert x == pytest.approx([-2.0])
+
+
 def test_between_sizes_that_were_seen_a_guess_stays_where_these_lead():
     c = Candidate.of(known_effects()["servo_gain"], ("flm",), (1.0,))
     probes = scan(c, (1.0, 4.0), False)

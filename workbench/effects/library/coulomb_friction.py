@@ -1,22 +1,23 @@
-"""Dry friction in a servo's gear, beyond nominal."""
+"""More, or less, dry friction in a servo's gear than nominal."""
 
 from __future__ import annotations
 
-from workbench.effects.base import Parameter
-from workbench.effects.servo_constant import ServoConstant
+from workbench.effects.base import Parameter, scalar
+from workbench.effects.servo_constant import ServoConstant, more_or_less
 from workbench.robot import EffectSpec
 
 
 class CoulombFriction(ServoConstant):
-    """Coulomb (dry) friction in a servo's gear, beyond nominal."""
+    """More Coulomb (dry) friction in a servo's gear than nominal, or less."""
 
     name = "coulomb_friction"
     field = "coulomb"
     family = "friction"
-    parameters = (Parameter("torque", "N m", 0.0, 1.5, 0.03),)
+    parameters = (Parameter("torque", "N m", 0.0, 1.5, 0.03, adds_to="coulomb_friction"),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} has {spec.parameters['torque']:.3f} N m more dry friction."
+        torque = scalar(spec, "torque")
+        return f"{', '.join(spec.where)} has {abs(torque):.3f} N m {more_or_less(torque)} dry friction."
 
 
 EFFECT = CoulombFriction()

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs, scalar
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.effects.registers import Registers, mean_of_logs
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 from workbench.types import Array, Mask

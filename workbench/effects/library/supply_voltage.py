@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs
+from workbench.effects.base import Effect, Parameter
+from workbench.effects.registers import Registers, mean_of_logs
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw

@@ -1,22 +1,23 @@
-"""Friction that grows with a joint's speed, beyond nominal."""
+"""More, or less, friction that grows with a joint's speed than nominal."""
 
 from __future__ import annotations
 
-from workbench.effects.base import Parameter
-from workbench.effects.servo_constant import ServoConstant
+from workbench.effects.base import Parameter, scalar
+from workbench.effects.servo_constant import ServoConstant, more_or_less
 from workbench.robot import EffectSpec
 
 
 class ViscousFriction(ServoConstant):
-    """Friction that grows with a joint's speed, beyond nominal."""
+    """More friction that grows with a joint's speed than nominal, or less."""
 
     name = "viscous_friction"
     field = "viscous"
     family = "friction"
-    parameters = (Parameter("coefficient", "N m s/rad", 0.0, 2.0, 0.03),)
+    parameters = (Parameter("coefficient", "N m s/rad", 0.0, 2.0, 0.03, adds_to="viscous_friction"),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} has {spec.parameters['coefficient']:.3f} N m s/rad more viscous friction."
+        coefficient = scalar(spec, "coefficient")
+        return f"{', '.join(spec.where)} has {abs(coefficient):.3f} N m s/rad {more_or_less(coefficient)} viscous friction."
 
 
 EFFECT = ViscousFriction()

@@ -45,7 +45,7 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     last = whole.on(at_most(whole.evidence, options.finished))
     evidence = evaluator.evidence
     joints = [j for j in nominal.joints if any(j in e.channels for e in evidence)]
-    felt = [c for c in problem.pool if c.where != (nominal.base,)]
+    felt = [way for c in problem.pool if c.where != (nominal.base,) for way in c.one_way()]
     asked, by_registers = within_registers(felt, nominal, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 and options.most else []

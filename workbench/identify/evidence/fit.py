@@ -142,7 +142,8 @@ def regress(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]
     information: two parameters with the same effect would seem to be separable, and both well known. The residuals of the
     regression estimate the random part, which is subtracted (W. Fuller, Measurement error models, 1987).
     An effect that adds to a constant of the law which is recalibrated as well (dry friction) has the same response: the recording
-    shows their sum alone.
+    shows their sum alone. Where it takes from the constant, the slope of the recalibration is the mean one as far down as that:
+    it is proportional to the constant, and far less near nothing than at the fit.
     """
     h, k = f.hypothesis, len(f.hypothesis.theta)
     low, high = h.bounds()
@@ -154,8 +155,10 @@ def regress(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]
     J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
     chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
     precision = region.likelihood.precision(f.r, f.discrepancy)
-    for pair in h.alike():
-        J[:, pair] = _of_rank_one(J[:, pair], precision)
+    for k, i in h.alike():
+        J[:, [k, i]] = _of_rank_one(J[:, [k, i]], precision)
+        if (ratio := _recalibrated_instead(h, k, i)) is not None:
+            J[:, k] = ratio * J[:, i]
     scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
     return replace(f, J=J, noise_information=float(precision @ chance) * scatter)
 
@@ -164,6 +167,17 @@ def _of_rank_one(J: Array, precision: Array) -> Array:
     """Slopes (n, 2) of two parameters with the same response: the nearest ones that are multiples of each other."""
     along = np.linalg.svd(np.sqrt(precision)[:, None] * J, full_matrices=False)[2][0]
     return np.asarray(np.outer(J @ along, along))
+
+
+def _recalibrated_instead(h: Hypothesis, k: int, i: int) -> float | None:
+    """How many units of an effect's size (number i of theta) that takes from a constant a standard deviation of its recalibration
+    (number k) replaces, on average over all that is taken; None of an effect that takes nothing."""
+    c = next(c for c, s in zip(h.effects, h.slices()) if s.start == i)
+    if not c.less or not h.theta[i] > 0:
+        return None
+    sd, z = h.numbers[k].sd, h.theta[k]
+    left = np.exp(sd * z) + c.values([h.theta[i]])[0] / -c.least[0]
+    return float(h.theta[i] / (np.log(left) / sd - z)) if left > 0 else 0.0
 
 
 def slopes(options: EvidenceOptions, h: Hypothesis, r: Array) -> Asks[Array]:

@@ -9,7 +9,6 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 
-from workbench.effects.base import Effect
 from workbench.identify.evidence.fit import Asks, Fitted, evaluate, slopes
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
@@ -54,13 +53,8 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
            if (c.name, c.where) not in there and (c.effect.tied is None or c.effect.tied not in ties)]
     for c in h.effects:
         more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
-        out += [Candidate.of(c.effect, c.where, _neutral(c.effect), options=tuple(sorted((*c.options, name)))) for name in more]
+        out += [c.with_options((*c.options, name)) for name in more]
     return out
-
-
-def _neutral(effect: Effect) -> tuple[float, ...]:
-    """Initial numbers of an effect that has options: those that make the effect are zero, those that shape it are typical."""
-    return tuple(p.typical if p.shapes else 0.0 for p in effect.parameters)
 
 
 def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
@@ -83,7 +77,7 @@ def ways(probes: Sequence[Probe]) -> list[list[Probe]]:
     out: dict[object, list[Probe]] = {}
     for p in probes:
         shape = tuple(np.delete(p.x, p.moved).round(6)) if p.moved >= 0 else ()
-        out.setdefault((p.candidate.key, p.candidate.options, p.moved, shape), []).append(p)
+        out.setdefault((p.candidate, p.moved, shape), []).append(p)
     return list(out.values())
 
 
@@ -122,7 +116,7 @@ def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move)
     """Two moves at once: the responses are added, and the parameters of the fit are re-optimised linearly."""
     (one,), (two,) = a.added, b.added
     if one.key == two.key:  # two options of one effect that is there
-        two = Candidate.of(two.effect, two.where, _neutral(two.effect), options=tuple(sorted({*one.options, *two.options})))
+        two = two.with_options((*one.options, *two.options))
     sizes = {**dict(zip(b.hypothesis.labels, b.hypothesis.theta)), **dict(zip(a.hypothesis.labels, a.hypothesis.theta))}
     sizes |= {label: x for label, x in zip(b.hypothesis.labels, b.hypothesis.theta) if label not in f.hypothesis.labels}
     h = a.hypothesis.with_effect(two, np.array([sizes[label] for label in labels_of(two)]))

@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.identify.evidence.hypothesis import ZERO, Uncertain, zero_effect
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.physical import SERVO
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance, MotionRange
 from workbench.types import Array
@@ -112,6 +113,7 @@ def _scaled(servo: ServoConstants, scales: tuple[tuple[str, float], ...]) -> Ser
             out["no_load_speed"] /= by
         else:
             out[name] = getattr(servo, name) * by
+    out = {name: min(value, SERVO[name].most) for name, value in out.items()}  # a fit may try all ends at once
     return replace(servo, **out)  # type: ignore[arg-type]
 
 

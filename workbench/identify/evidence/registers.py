@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.compare.logged import register_laws
 from workbench.compare.session_takes import ReadTake
-from workbench.effects.base import Registers
+from workbench.effects.registers import Registers
 from workbench.identify.estimators.registers import readings
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from workbench.effects.apply import add_possible
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.nuisance import as_mapping, recalibrate
 from workbench.identify.evidence.region import Region
@@ -58,7 +59,7 @@ class Rollouts:
         model = recalibrate(self.nominal, z)
         for law in (h.law for h in hypotheses if h.law is not None):
             model = law.added_to(model)
-        return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
+        return add_possible(model, [spec for h in (*hypotheses, self.shared) for spec in h.specs()])
 
     def around_here(self, step: float, horizon: float | None = None) -> Rollouts:
         """The same rollouts at another step, whose error is measured on the current best model from now on, and over another

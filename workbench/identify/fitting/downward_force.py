@@ -34,5 +34,5 @@ def downward_pulls(fit: Fit) -> Iterator[Unexplained]:
 
 def _pull(c: Candidate, x: Array) -> Array:
     """The force (3,) [N] on the base, in the world's axes; zero of an effect that has none."""
-    pull = c.effect.tether(si_values(c.effect, c.spec(x)))
+    pull = c.effect.tether(si_values(c.effect, c.spec(x), c.lowest))
     return np.zeros(3) if pull is None else pull

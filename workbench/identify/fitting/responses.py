@@ -46,7 +46,9 @@ def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     shapes = FIT.shaped if c.shapes.any() and not walking else (0.0,)
     if not walking and math.isinf(c.neutral[0]):
         sizes = sorted({*sizes, FIT.scanned_between})
-    points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
+    less = [-max(sizes)] if not walking and c.takes_away.any() else []  # of walks, the response to more of it has to do
+    scales = [*(w * s for s in sizes for w in ways), *less]
+    points = [np.clip(s * probes[0] + d * c.shapes, low, high) for d in shapes for s in scales]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
