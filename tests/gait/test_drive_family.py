@@ -61,6 +61,9 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
     (tmp_path / FILE).write_text(json.dumps({**content, "most": 0.5}))
     with pytest.raises(InputError, match="changed"):
         read_family(gait, model)
+    (tmp_path / FILE).write_text("[]")
+    with pytest.raises(InputError, match="not a family's certificate"):
+        read_family(gait, model)
     certificate.write(tmp_path)
     with pytest.raises(InputError, match="another robot"):
         read_family(gait, model.with_effects((EffectSpec("ground_friction", (), {"friction": 0.4}),)))
