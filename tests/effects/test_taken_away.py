@@ -2,15 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from workbench.effects.apply import add_possible, apply_to_commands, law_of, physics_of
+from workbench.effects.apply import add_possible, law_of, physics_of
 from workbench.effects.base import Effect, Parameter
 from workbench.effects.foreign import check_effect
 from workbench.effects.registry import known_effects
 from workbench.files import InputError
-from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel, ServoConstants, puppy_model
 
 ADDED = {e.name: e for e in known_effects().values() if any(p.adds_to for p in e.parameters)}
@@ -34,15 +32,9 @@ def less(model: RobotModel, name: str, share: float, where: tuple[str, ...] = ("
     return EffectSpec(name, where, {p.name: share * lowest[p.name] for p in effect.parameters if p.adds_to})
 
 
-def played(model: RobotModel) -> Commands:
-    sent = Commands(np.array([0.0, 0.5, 1.0]), model.joints, np.outer([0.0, 0.4, -0.2], np.ones(len(model.joints))),
-                    np.ones((3, len(model.joints))), np.ones((3, len(model.joints)), dtype=bool), 1.5, np.arange(3))
-    return apply_to_commands(sent, model)
-
-
 def test_friction_inertia_and_what_a_servo_is_set_to_can_be_less_than_nominal():
     assert set(ADDED) == {"coulomb_friction", "viscous_friction", "load_friction", "reflected_inertia", "dead_band",
-                          "minimum_duty", "damping_gain", "command_filter", "command_delay"}
+                          "minimum_duty", "damping_gain", "command_filter"}
 
 
 @pytest.mark.parametrize("name", sorted(ADDED))
@@ -58,11 +50,6 @@ def test_a_constant_less_a_part_of_it_acts_as_the_smaller_constant(name, share):
         assert getattr(b.law, field)[column] == pytest.approx(getattr(a.law, field)[column], abs=1e-12)
     loads = [[t.numbers().rubbing for t in physics.servo_terms] for physics in (a, b)]
     assert sum(r[column] for r in loads[1] if r is not None) == pytest.approx(sum(r[column] for r in loads[0] if r is not None))
-    late = [played(m) for m in (expected, found)]
-    times = np.arange(0.0, 1.5, 1e-3)
-    held = [c.goals[np.maximum(np.searchsorted(c.times, times + 1e-9, side="right") - 1, 0), column] * (times >= c.times[0])
-            for c in late]
-    assert np.array_equal(*held)
 
 
 def test_the_lower_bound_is_the_smallest_constant_of_several_joints_with_what_the_model_adds():
@@ -70,7 +57,6 @@ def test_the_lower_bound_is_the_smallest_constant_of_several_joints_with_what_th
     model = model.with_physics({**model.servos, "frm": replace(SERVO, coulomb_friction=0.05)}, ())
     assert effect.lowest(model, ("flm",)) == pytest.approx((-0.15,))
     assert effect.lowest(model, ("flm", "frm")) == pytest.approx((-0.05,))
-    assert ADDED["command_delay"].lowest(model, ()) == pytest.approx((-0.02,))
     more = model.with_effect(EffectSpec("coulomb_friction", ("flm",), {"torque": 0.1}))
     assert effect.lowest(more, ("flm",)) == pytest.approx((-0.25,))
     assert ADDED["load_friction"].lowest(model, ("flm",)) == pytest.approx((-0.2, 0.0, 0.5, 0.0))
@@ -103,8 +89,7 @@ def test_a_search_that_takes_away_more_than_a_recalibrated_constant_takes_all_of
     ("dead_band", "The dead band of flm is 1.5 deg narrower on each side of its goal."),
     ("minimum_duty", "The smallest duty of flm is below nominal by 6.0 % of full duty."),
     ("damping_gain", "flm has a derivative gain 0.3000 duty per rad/s below nominal."),
-    ("command_filter", "flm filters its goals with a time constant 40.0 ms below nominal."),
-    ("command_delay", "Commands reach flm 20.0 ms sooner than nominal.")])
+    ("command_filter", "flm filters its goals with a time constant 40.0 ms below nominal.")])
 def test_sentences_say_less_without_a_minus_sign(name, sentence):
     assert ADDED[name].sentence(less(robot(), name, 1.0)) == sentence
     assert "less" not in ADDED[name].sentence(less(robot(), name, -1.0))

@@ -201,3 +201,9 @@ def test_what_a_file_leaves_out_of_the_law_comes_from_its_family() -> None:
     assert full.stall_torque == 2.94
     assert with_family_law(replace(sheet, model="a servo of no family"), ()) == replace(sheet, model="a servo of no family")
     assert with_family_law(ServoConstants(), ()) == ServoConstants()  # of the AX-12A nothing more is known
+
+
+def test_a_filter_far_faster_than_a_step_is_none():
+    """Turned back by a step, it would divide by exp(-step / lag), which is 0."""
+    lags = [ServoLaw.of([replace(PLAIN, command_filter=lag)]).lag[0] for lag in (0.0, 1e-9, 2e-3)]
+    assert lags == [0.0, 0.0, 2e-3]

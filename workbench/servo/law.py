@@ -13,6 +13,10 @@ from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable
 from workbench.types import Array, Mask
 
+LEAST_LAG = 1e-4
+"""A filter of the goal that is faster than this [s] counts as none: turned back by a step of milliseconds, it would divide by
+nothing."""
+
 
 @lru_cache(maxsize=256)  # robots that a fit compares differ in few servos
 def _constants(s: ServoConstants) -> tuple[float, ...]:
@@ -25,8 +29,8 @@ def _constants(s: ServoConstants) -> tuple[float, ...]:
 class ServoLaw:
     """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m] and that per
     volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]; derivative gain
-    [duty per rad/s], speed of the goal's ramp [rad/s] (infinite: none), time constant of the goal's lag [s], and friction as a
-    share of the load; tables: torques beyond all that, each with the number of its servo.
+    [duty per rad/s], speed of the goal's ramp [rad/s] (infinite: none), time constant of the goal's lag [s] (0 if below
+    LEAST_LAG), and friction as a share of the load; tables: torques beyond all that, each with the number of its servo.
     A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
 
     gain: Array
@@ -43,6 +47,9 @@ class ServoLaw:
     lag: Array
     load_friction: Array
     tables: tuple[tuple[int, TorqueTable], ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lag", np.where(self.lag < LEAST_LAG, 0.0, self.lag))
 
     @staticmethod
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:

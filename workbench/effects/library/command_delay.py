@@ -1,4 +1,4 @@
-"""Commands reach the servos late, or sooner than nominal."""
+"""Commands reach the servos late."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ ages of register and position differ by some milliseconds."""
 
 
 class CommandDelay(Effect):
-    """Commands reach the servos late. A negative delay takes away the servos' nominal one, which is none of switching torque
-    off."""
+    """Commands reach the servos late."""
 
     name = "command_delay"
     layer = "timing"
@@ -26,17 +25,13 @@ class CommandDelay(Effect):
     family = "timing"
     like_a_late_start = True
     # two rounds of a USB adapter whose latency timer is at its default of 16 ms, plus the servo's own delay
-    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0), seldom_beyond=0.04,
-                            adds_to="goal_delay"),)
+    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0), seldom_beyond=0.04),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        delay = scalar(spec, "delay")
-        how = "sooner than nominal" if delay < 0 else "late"
-        return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * abs(delay):.1f} ms {how}."
+        return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * scalar(spec, 'delay'):.1f} ms late."
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
-        columns = [commands.joints.index(j) for j in where] or range(len(commands.joints))
-        return delay_commands(commands, columns, values["delay"], switched=values["delay"] > 0)
+        return delay_commands(commands, [commands.joints.index(j) for j in where] or range(len(commands.joints)), values["delay"])
 
     def in_duty(self, law: RegisterLaw, servo: ServoConstants) -> tuple[float, float] | None:
         """Beyond the servo's own delay, as well as that is known."""
