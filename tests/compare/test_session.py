@@ -1,4 +1,4 @@
-"""The session file: what it may say, and how it is refused."""
+"""The session file: valid and invalid content, and the messages for the latter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Servo logs of a one-joint rig, from files to findings: what was put in is named, and what is only calibration is not."""
+"""Servo logs of a one-joint rig, from files to findings: hidden effects are named, deviations within the calibration are not."""
 
 import json
 
