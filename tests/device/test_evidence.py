@@ -11,7 +11,7 @@ from workbench.robot.servo_registers import ServoReading, ServoRegisters, save_r
 
 
 def test_registers_are_read_off(tmp_path):
-    """What no effect says (a punch) is told by `servos`, and is no finding."""
+    """A register that no effect describes (punch) is reported by `servos`, but is not a finding."""
     write_session(tmp_path)
     nominal = {"cw_compliance_slope": 32, "ccw_compliance_slope": 32, "cw_compliance_margin": 1, "ccw_compliance_margin": 1}
     nominal |= {"punch": 32}
@@ -21,7 +21,7 @@ def test_registers_are_read_off(tmp_path):
     save_registers(ServoRegisters("AX-12A", "2026-11-27T12:00:00+00:00", readings), tmp_path / "registers.yaml")
     content = session_content() | {"registers": "registers.yaml"}
     (tmp_path / "session.yaml").write_text(yaml.safe_dump(content))
-    (measured,) = read_off_registers(load_session(tmp_path), [])
+    (measured,) = read_off_registers(load_session(tmp_path), {})
     assert (measured.effect, measured.where) == ("dead_band", "two")
     assert measured.mean == pytest.approx(300 / 1023)
     assert "own register, without" in measured.seen
@@ -38,4 +38,4 @@ def test_a_session_whose_registers_are_missing(tmp_path, registers, said):
 def test_a_session_without_registers_has_none(tmp_path):
     session = load_session(write_session(tmp_path))
     assert session.registers is None
-    assert read_off_registers(session, []) == ()
+    assert read_off_registers(session, {}) == ()

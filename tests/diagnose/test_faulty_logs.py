@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tests.command import main
-from workbench.compare.logged import describe_logging
+from workbench.compare.logged import describe_logging, register_laws
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.files.resources import resource_dir
@@ -58,7 +58,7 @@ def _session(folder: Path, spoil: Callable[[Rows], None]) -> Path:
 @pytest.mark.parametrize(("spoil", "said"), FAULTS)
 def test_what_was_set_aside_is_part_of_the_provenance(tmp_path: Path, spoil: Callable[[Rows], None], said: str) -> None:
     takes = read_takes(load_session(_session(tmp_path, spoil)))[0]
-    found = describe_logging(takes)
+    found = describe_logging(takes, register_laws(takes))
     assert list(found["set_aside"]) == ["slow"]
     (sentence,) = said_aside(found)
     assert sentence.startswith(f"Corrected or excluded in slow: {said}")

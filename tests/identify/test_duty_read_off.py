@@ -9,6 +9,7 @@ from studies.sts3215.sessions import RIGS, SERVO
 from tests.gap_sessions import write_session
 from tests.recording.test_how_logged import as_register, servo_log
 from tests.servo_rig import rig_model
+from workbench.compare.logged import register_laws
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.identify.estimators.registers import read_off_duty, read_off_registers
@@ -36,7 +37,7 @@ def session(folder, told):
 @pytest.mark.parametrize(("told", "true"), [(2.0, 0.5), (0.5, 2.0)])
 def test_a_gain_told_wrong_is_read_from_the_duty(tmp_path, told, true):
     s = session(tmp_path, told)
-    (measured,) = read_off_registers(s, read_takes(s)[0])
+    (measured,) = read_off_registers(s, register_laws(read_takes(s)[0]))
     assert (measured.effect, measured.where) == ("servo_gain", "servo")
     assert measured.mean == pytest.approx(true, abs=2 * measured.sigma)
     assert "register of duty" in measured.seen
@@ -44,11 +45,11 @@ def test_a_gain_told_wrong_is_read_from_the_duty(tmp_path, told, true):
 
 def test_a_gain_told_right_is_no_finding_and_one_that_the_model_has_is_not_found_again(tmp_path):
     s = session(tmp_path, 1.0)
-    assert read_off_registers(s, read_takes(s)[0]) == ()
+    assert read_off_registers(s, register_laws(read_takes(s)[0])) == ()
     s = session(tmp_path, 2.0)
-    (measured,) = read_off_registers(s, read_takes(s)[0])
+    (measured,) = read_off_registers(s, register_laws(read_takes(s)[0]))
     known = s.with_model(s.model.with_effects((measured.spec,)))
-    assert read_off_registers(known, read_takes(known)[0]) == ()
+    assert read_off_registers(known, register_laws(read_takes(known)[0])) == ()
 
 
 SD = {"gain": 0.001, "delay": 1e-4, "rate": 1e-5}

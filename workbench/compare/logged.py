@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from workbench.files.problem import CorrectedProblem
 from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
 
 
-def describe_logging(takes: Sequence[ReadTake]) -> dict[str, Any]:
+def describe_logging(takes: Sequence[ReadTake], laws: Mapping[str, RegisterLaw]) -> dict[str, Any]:
     """For provenance: by take, the notes and the readings that were set aside; by joint, the servo law read from the duty
-    register. Empty if there is nothing to report."""
+    register (laws: of `register_laws`). Empty if there is nothing to report."""
     notes = {t.spec.name: list(t.recording.notes) for t in takes if t.recording.notes}
-    laws = {joint: str(law) for joint, law in register_laws(takes).items()}
     found: dict[str, Any] = {"logs": notes} if notes else {}
     aside = {t.spec.name: lines for t in takes if (lines := corrected_problems(t.recording.problems))}
-    return found | ({"duty_registers": laws} if laws else {}) | ({"set_aside": aside} if aside else {})
+    of_duty = {joint: str(law) for joint, law in laws.items()}
+    return found | ({"duty_registers": of_duty} if of_duty else {}) | ({"set_aside": aside} if aside else {})
 
 
 def corrected_problems(problems: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
-from workbench.compare.logged import describe_logging
+from workbench.compare.logged import describe_logging, register_laws
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
@@ -131,7 +131,8 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames
     measured = geometry_of(session.model, evaluator.evidence, nominal.residuals) if gap else Geometry()
     build = _check_geometry(measured, evaluator, session.model, nominal)
-    read_off = (*build.measured, *read_off_registers(session, takes))
+    laws = register_laws([e.take for e in evaluator.evidence])
+    read_off = (*build.measured, *read_off_registers(session, laws))
     build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
     as_built = _again(evaluator, known, takes, progress) if build.measured else evaluator
@@ -150,7 +151,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
     options = settings.options if gap else settings.options.without_names()
     found = search(Problem(evaluator, known.model, start.residuals, pool, replace(as_played, missed=missed), settings.thorough,
-                           progress, options))
+                           progress, options, laws))
 
     give_back()
 
@@ -177,7 +178,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at) | describe_logging([e.take for e in evidence])
+        | subset_used(found.looked_at) | describe_logging([e.take for e in evidence], laws)
         | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
         unknown_torques=unknown, tied=found.tied)

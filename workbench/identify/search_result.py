@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from workbench.identify.results.ties import Tie
     from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
+    from workbench.recording.servo_log.duty_register import RegisterLaw
     from workbench.robot import Posterior, RobotModel
 
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 class Problem:
     """The problem for a search. nominal: the robot with the direct estimates; residuals: its residuals, by take; pool: effects
     that may act; played: commands that never arrived, which a search may estimate again; thorough: without a limit of work;
-    options: of a search of servo logs."""
+    options: of a search of servo logs; laws: behind the duty registers of the logs, by joint."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -37,6 +38,7 @@ class Problem:
     thorough: bool
     progress: Progress
     options: EvidenceOptions
+    laws: Mapping[str, RegisterLaw]
 
 
 class SearchResult(Protocol):

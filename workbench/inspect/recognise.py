@@ -302,11 +302,12 @@ def _session(path: Path) -> Inspection:
 
 def _describe_logging(session: Session) -> dict[str, str]:
     """How servo logs were logged; empty where the takes cannot be read, which is reported as their problem."""
-    from workbench.compare.logged import describe_logging
+    from workbench.compare.logged import describe_logging, register_laws
     from workbench.compare.session_takes import read_takes
 
     try:
-        logging = describe_logging(read_takes(session)[0])
+        takes = read_takes(session)[0]
+        logging = describe_logging(takes, register_laws(takes))
     except InputError:
         return {}
     notes = {f"logged: {name}": "; ".join(lines) for name, lines in logging.get("logs", {}).items()}

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.compare.logged import register_laws
 from workbench.compare.session import Session
-from workbench.compare.session_takes import ReadTake
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.identify.estimators.geometry import Measured
@@ -17,17 +15,20 @@ from workbench.identify.parameters import Key
 from workbench.recording.servo_log.duty_register import RegisterLaw
 from workbench.robot import RobotModel
 
+Readings = Mapping[Key, tuple[float, float]]
+"""First parameter and standard error of effects, by effect and place."""
 
-def read_off_registers(session: Session, takes: Sequence[ReadTake]) -> tuple[Measured, ...]:
-    """Effects that registers tell, one for each that is not as the nominal model has it: of the session's file of registers, else
-    of the columns of duty in its logs."""
+
+def read_off_registers(session: Session, laws: Mapping[str, RegisterLaw]) -> tuple[Measured, ...]:
+    """Effects identified from registers, one for each that differs from the nominal model: from the session's file of registers,
+    else from the duty in its logs. laws: behind that duty, by joint."""
     told, model = _of_file(session), session.model
     known = {m.effect for m in told} | {e.effect for e in model.effects}
-    return (*told, *(m for m in read_off_duty(model, register_laws(takes)) if m.effect not in known))
+    return (*told, *(m for m in read_off_duty(model, laws) if m.effect not in known))
 
 
 def read_off_duty(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> list[Measured]:
-    """Effects that the duty of servos shows, those that are surely there. laws: by joint."""
+    """Effects identified from the duty of servos, where they differ from neutral by five standard errors. laws: by joint."""
     out = []
     for (name, where), (value, error) in readings(model, laws).items():
         effect = known_effects()[name]
@@ -38,9 +39,9 @@ def read_off_duty(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> list[Me
     return out
 
 
-def readings(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> dict[Key, tuple[float, float]]:
-    """First parameter and standard error of each effect that the duty of servos shows, by effect and place: of the robot where
-    that is possible and all of its joints agree."""
+def readings(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> Readings:
+    """Readings of each effect that the duty of servos shows: of the whole robot where that is possible and all of its joints
+    agree, else by joint."""
     out = dict[Key, tuple[float, float]]()
     for effect in known_effects().values():
         shown = {joint: r for joint, law in laws.items() if (r := effect.in_duty(law, model.servo(joint))) is not None}

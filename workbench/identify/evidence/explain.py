@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from workbench.identify.estimators.registers import readings
 from workbench.identify.evidence.checks import checks, drifts, refute
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, regress
@@ -46,7 +47,7 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     evidence = evaluator.evidence
     joints = [j for j in nominal.joints if any(j in e.channels for e in evidence)]
     felt = [way for c in problem.pool if c.where != (nominal.base,) for way in c.one_way()]
-    asked, by_registers = within_registers(felt, nominal, [e.take for e in evidence], options)
+    asked, by_registers = within_registers(felt, [e.take for e in evidence], readings(nominal, problem.laws), options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 and options.most else []
     most_work = math.inf if problem.thorough else options.most_work

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.robot import RobotModel
 
-def range_of(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel,
-             options: RangeOptions) -> MotionRange | None:
+
+def range_of(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel, options: RangeOptions) -> MotionRange | None:
     """The joint's motion in some takes; None where it was hardly seen."""
     speeds, accelerations, duties = list[Array](), list[Array](), list[Array]()
     for time, angle, duty in course(joint, evidence, model):

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.compare.logged import register_laws
 from workbench.compare.session_takes import ReadTake
 from workbench.effects.registers import Registers
-from workbench.identify.estimators.registers import readings
+from workbench.identify.estimators.registers import Readings
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Rejected
 from workbench.identify.results.reasons import RefutedByRegister
-from workbench.robot import RobotModel
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
@@ -31,12 +29,11 @@ def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
     return out
 
 
-def within_registers(candidates: Sequence[Candidate], model: RobotModel, takes: Sequence[ReadTake], options: EvidenceOptions
+def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], of_duty: Readings, options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
     """Candidates limited to the range allowed by the registers, and those refuted: for which even `refuted` of the
     typical size is further than `sure` standard errors from the register's value."""
-    logs, of_duty = registers_of(takes), readings(model, register_laws(takes))
-    kept, refuted = list[Candidate](), list[Rejected]()
+    logs, kept, refuted = registers_of(takes), list[Candidate](), list[Rejected]()
     for c in candidates:
         shown = c.effect.in_registers(logs, c.where) or of_duty.get(c.key)
         if shown is None:
