@@ -41,6 +41,7 @@ def test_a_gain_told_wrong_is_read_from_the_duty(tmp_path, told, true):
     assert (measured.effect, measured.where) == ("servo_gain", "servo")
     assert measured.mean == pytest.approx(true, abs=2 * measured.sigma)
     assert "register of duty" in measured.seen
+    assert "the servo's register" in measured.seen
 
 
 def test_a_gain_told_right_is_no_finding_and_one_that_the_model_has_is_not_found_again(tmp_path):
@@ -81,5 +82,6 @@ def test_joints_that_agree_share_one_clock_and_one_delay(tmp_path):
     model = load_session(write_session(tmp_path)).model
     late = {joint: law(delay=0.04, rate=1.01) for joint in model.joints}
     assert {(m.effect, m.places) for m in read_off_duty(model, late)} == {("command_delay", ()), ("clock_rate", ())}
+    assert all("the servos' registers" in m.seen for m in read_off_duty(model, late))
     found = read_off_duty(model, late | {"two": law()})
     assert {(m.effect, m.where) for m in found} == {("command_delay", j) for j in model.joints if j != "two"}

@@ -34,7 +34,8 @@ def read_off_duty(model: RobotModel, laws: Mapping[str, RegisterLaw]) -> list[Me
         effect = known_effects()[name]
         p, neutral = effect.parameters[0], effect.neutral(model)[0]
         if abs(value - neutral) > READ_OFF.geometry_sure * error and effect.lowest(model, where)[0] <= value <= p.high:
-            seen = f" Read from the servo{'s' * (not where)}' register of duty in the logs, without any simulation."
+            of = "the servo's register" if where else "the servos' registers"
+            seen = f" Read from {of} of duty in the logs, without any simulation."
             out.append(Measured(name, where[0] if where else "", value, error, seen))
     return out
 
