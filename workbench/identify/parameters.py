@@ -225,6 +225,8 @@ def _at(p: Parameter, size: float, neutral: float, typical: float) -> float:
 
 def _size(p: Parameter, value: float, neutral: float, typical: float) -> float:
     """The size of a number at a value."""
+    if p.shapes:
+        return math.log2(value / neutral)
     if p.logarithmic:
         return math.log(value / neutral) / math.log(typical / neutral)
     return (value - neutral) / (typical - neutral)
