@@ -30,7 +30,8 @@ def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Re
 
 
 def _distances(c: Candidate, x: Array) -> Iterator[tuple[Parameter, float, float]]:
-    """Each parameter but those that only shape the effect, its value, and its distance from neutral; for a vector, its length instead of its value."""
+    """Each parameter but those that only shape the effect, its value, and its distance from neutral; for a vector, its length
+    instead of its value."""
     values, neutral = iter(c.values(x)), iter(c.neutral)
     for p in c.given:
         n = 3 if p.vector else 1
