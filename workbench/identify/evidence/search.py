@@ -167,11 +167,12 @@ def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
                                     for h, J in states])
     fits = with_better(found.fits, made)
     again: dict[Key, list[Hypothesis]] = {}
+    near = [f.hypothesis for f in found.beam(options) if f.log_posterior > best.log_posterior - 3 * options.occam]
     for starts in (*akin(region, options, best.hypothesis),
-                   *([at_typical_sizes(f.hypothesis, share) for share in options.sizes] for f in found.beam(options))):
+                   *([at_typical_sizes(h, share) for share in options.sizes] for h in near)):
         if starts[0].effects and starts[0].key not in found.restarted:
             again.setdefault(starts[0].key, []).extend(starts)
-    made = yield from restart(region, options, list(again.values()), best.discrepancy)
+    made = yield from restart(region, options, list(again.values()), best)
     fits = with_better(fits, [*made, *(reduce(region, options, f) for f in made)])
     found = replace(found, fits=fits, restarted=found.restarted | frozenset(again))
     return (yield from _extend(found, options, [fits[h.key] for h, _ in states], options.beam))

@@ -43,11 +43,13 @@ def fit_from_starts(region: Region, options: EvidenceOptions, starts: Sequence[H
     return (yield from polish(region, options, max(fits, key=lambda f: f.log_posterior)))
 
 
-def restart(region: Region, options: EvidenceOptions, starts: Sequence[Sequence[Hypothesis]], s: float) -> Asks[list[Fitted]]:
-    """The likeliest fit from several starts of each of some models at a discrepancy s; of the likeliest models continued."""
+def restart(region: Region, options: EvidenceOptions, starts: Sequence[Sequence[Hypothesis]], best: Fitted) -> Asks[list[Fitted]]:
+    """The likeliest fit from several starts of each of some models; those that come near the best fit are continued."""
     fits = yield from side_by_side([
-        side_by_side([fit_hypothesis(region, options, h, s, options.iterations) for h in of_one]) for of_one in starts])
+        side_by_side([fit_hypothesis(region, options, h, best.discrepancy, options.iterations) for h in of_one])
+        for of_one in starts])
     each = sorted((max(of_one, key=lambda f: f.log_posterior) for of_one in fits), key=lambda f: -f.log_posterior)
+    near = sum(f.log_posterior > best.log_posterior - options.hopeless for f in each[:options.refined])
     for _ in range(2):
-        each[:options.refined] = yield from side_by_side([polish(region, options, f) for f in each[:options.refined]])
+        each[:near] = yield from side_by_side([polish(region, options, f) for f in each[:near]])
     return each
