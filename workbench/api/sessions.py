@@ -162,7 +162,7 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
 
 def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | None = None, *,
              progress: Progress = no_progress) -> DiagnosisResult:
-    """Finds the physics that a session's model left out: 30 to 50 s of processor time for a practice session (docs/validation.md)
+    """Finds the physics that a session's model left out: 15 to 30 s of processor time for a practice session (docs/validation.md)
     in which one or two effects are missing, some minutes for more.
 
     session: loaded, or a session.yaml or its folder. progress: called with the stage and the share done. Returns effects with
