@@ -70,6 +70,28 @@ def test_a_negative_variance_is_refused(tmp_path: Path, variance: str) -> None:
         load_model(_model(tmp_path, MODEL.replace("[[0.01]]", f"[[{variance}]]")))
 
 
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("mean: [3.1]", "mean: [9]", r"mean: expected 3\.1 of backlash\(flm\)\.gap, as the effect has it, got 9; where an effect"),
+    ("gap: 3.1", "gap: 2.1", r"mean: expected 2\.1 of backlash\(flm\)\.gap"),
+    (", parameters: {gap: 3.1}}", ", parameters: {gap: 3.1}}\n- {effect: backlash, where: [frm], parameters: {gap: 1}}",
+     "posterior.names: expected those of the effects")])
+def test_a_posterior_of_other_effects_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in MODEL
+    with pytest.raises(InputError, match=said):
+        load_model(_model(tmp_path, MODEL.replace(old, new)))
+
+
+@pytest.mark.parametrize(("rows", "said"), [("[[1, 0.5], [0, 1]]", "the same numbers across the diagonal"),
+                                            ("[[1, 2], [2, 1]]", "no negative variance in any direction")])
+def test_a_matrix_that_is_no_covariance_is_refused(tmp_path: Path, rows: str, said: str) -> None:
+    text = MODEL.replace(", parameters: {gap: 3.1}}", ", parameters: {gap: 3.1}}\n"
+                         "- {effect: backlash, where: [frm], parameters: {gap: 1}}")
+    text = text.replace("[backlash(flm).gap], mean: [3.1], covariance: [[0.01]]",
+                        f"[backlash(flm).gap, backlash(frm).gap], mean: [3.1, 1], covariance: {rows}")
+    with pytest.raises(InputError, match=f"posterior.covariance: expected {said}"):
+        load_model(_model(tmp_path, text))
+
+
 def test_an_effect_given_twice_is_told(tmp_path: Path) -> None:
     text = MODEL.replace("effects:\n", "effects:\n- {effect: backlash, where: [flm], parameters: {gap: 1.0}}\n")
     text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("posterior"))
