@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.command import refused
 from tests.inputs.corpus import MODEL
 from workbench.compare.session import load_session
 from workbench.files import InputError
@@ -33,6 +34,26 @@ def test_entries_that_cannot_be_meant_are_told(tmp_path: Path) -> None:
     assert any("load: 3 kg weighs more than the robot" in text for text in heavy)
     with pytest.raises(InputError, match=r"load\.mass: expected a number of at least 0 and at most 5, got 200"):
         _slow(tmp_path, "load: {link: hand, mass: 200, at: [0, 0, 0]}")
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("name: slow", 'name: "a\\x07b"', r"takes\[0\]\.name: expected a name that can be a file's"),
+    ("format: 1", "format: true", "format: expected 1")])
+def test_entries_of_a_rude_kind_are_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    path = tmp_path / "arm/session.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=said):
+        load_session(path)
+
+
+def test_a_session_of_another_robot_names_its_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    path = tmp_path / "arm/session.yaml"
+    lines = [line for line in path.read_text().splitlines() if "model:" not in line and "base: base" not in line]
+    path.write_text("\n".join(lines) + "\n")
+    assert refused(capsys, "inspect", str(path)).count(f"{path}: ") == 1
 
 
 def test_a_take_of_less_than_half_a_second_is_told(tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ def _table(path: Path, model: RobotModel, beside_motion: bool) -> Take:
     return take
 
 
-def _check_registers(read: ReadTake, commands: Commands) -> None:
+def _check_registers(read: ReadTake, commands: Commands | None) -> None:
     """InputError, before anything is simulated, for a capture that cannot be brought into the model's frame and clock."""
     try:
         register_take(replace(read, commands=read.commands or commands), None, None)

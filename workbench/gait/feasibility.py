@@ -20,6 +20,8 @@ from workbench.types import Array
 STANDING = "RMS torque of standing still"
 WITHOUT_NEAREST = ("slope", STANDING)
 """Limits beside which there is no nearest table."""
+ABSURD = 10.0
+"""Use of a limit beyond which a request is a slip of the pen, and nobody waits for the nearest gait."""
 CROUCHES = (0.0, 0.05, 0.15, 0.3, 0.45)
 """By leg length, in which standing still is tried."""
 HELD = 0.5
@@ -46,6 +48,11 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
         if margin is not None and margin.use > 1:
             return margin
     return _path(machine, request)
+
+
+def has_nearest(impossible: Margin) -> bool:
+    """Whether a request that exceeds this limit is answered with the nearest table."""
+    return impossible.name not in WITHOUT_NEAREST and impossible.use <= ABSURD
 
 
 def _check_arc(machine: GaitMachine, request: Request) -> None:

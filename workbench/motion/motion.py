@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -64,7 +65,8 @@ class Motion:
         if self.speeds is not None:
             for k, i in np.argwhere(~(np.isfinite(self.speeds) & (self.speeds >= 0)))[:1]:
                 place = f"row {k + 1}, joint {self.joints[i]}"
-                raise InputError(self.source, f"{place}: expected a moving speed of 0 or more, got {self.speeds[k, i]}")
+                raise InputError(self.source, f"{place}: expected a moving speed of 0 deg/s or more, got "
+                                              f"{math.degrees(self.speeds[k, i]):.6g}")
         for k in np.flatnonzero(~np.isfinite(self.times))[:1]:
             raise InputError(self.source, f"row {k + 1}: expected a finite time, got {self.times[k]}")
         for k in np.flatnonzero(np.diff(self.times) <= 0)[:1]:
