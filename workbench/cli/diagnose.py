@@ -64,7 +64,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
-    from workbench.view.report.words import hidden_effects, said_aside
+    from workbench.view.report.words import hidden_effects, said_aside, suspect_constants
 
     session, before = load_session(path), None if previous is None else Path(previous)
     warned = check_session("diagnose", session, yes)
@@ -76,6 +76,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     say_left_out("diagnose", diagnosis.left_out, warned)
     if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
+    for sentence in suspect_constants(diagnosis.recalibrated):
+        print(f"workbench diagnose: warning: {sentence}", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")
     for tied in diagnosis.tied:
         print(f"  {tied.in_words()}")
