@@ -46,8 +46,15 @@ class Posterior:
             raise InputError(None, f"posterior: expected mean ({n},) and covariance ({n}, {n}), got {got}")
 
     def in_order(self, effects: Sequence[EffectSpec]) -> Posterior:
-        """The same, in the order of these effects, as a model.yaml with them has it."""
-        at = [self.names.index(name) for name in parameter_names(effects) if name in self.names]
+        """The same, in the order of these effects, as a model.yaml with them has it. Numbers of one name (a zero that was
+        recalibrated, and one that was found) keep the order among them."""
+        left = list(range(len(self.names)))
+        at = []
+        for name in parameter_names(effects):
+            k = next((k for k in left if self.names[k] == name), None)
+            if k is not None:
+                left.remove(k)
+                at.append(k)
         return Posterior(tuple(self.names[k] for k in at), np.asarray(self.mean)[at], np.asarray(self.covariance)[np.ix_(at, at)])
 
 
