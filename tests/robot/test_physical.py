@@ -17,6 +17,7 @@ from workbench.gait.ensemble import load_ensemble
 from workbench.inspect.problems import model_problems_of
 from workbench.physical import GROUND, MASS, SERVO, TIME_STEP
 from workbench.robot import Ground, RobotModel, load_model, load_servo_constants, puppy_model
+from workbench.robot.law_covariance import LawCovariance
 from workbench.robot.servo_constants import ServoConstants
 from workbench.robot.torque_table import TorqueTable
 from workbench.simulation import MakeStation, SimulationConfig
@@ -137,3 +138,12 @@ def test_a_standard_deviation_beyond_its_value_is_told(tmp_path: Path) -> None:
     (tmp_path / "servo.yaml").write_text(SERVO_FILE.replace("supply_voltage: 11.1", "supply_voltage: {value: 11.1, sd: 1000}"))
     (told,) = load_servo_constants(tmp_path / "servo.yaml").doubts
     assert told.startswith("supply_voltage: sd 1000 is more than 3 times its value")
+
+
+def test_a_constant_of_which_nothing_is_known_is_refused(tmp_path: Path) -> None:
+    given = "supply_voltage: {value: 11.1, sd: 1.0e+30}"
+    (tmp_path / "servo.yaml").write_text(SERVO_FILE.replace("supply_voltage: 11.1", given))
+    with pytest.raises(InputError, match=r"supply_voltage: sd: expected at most 100 times the value, got 1e\+30"):
+        load_servo_constants(tmp_path / "servo.yaml")
+    with pytest.raises(InputError, match=r"covariance: expected variances of at most 10000, got 1e\+30"):
+        LawCovariance(("back_emf",), ((1e30,),))
