@@ -64,6 +64,15 @@ def test_a_take_of_less_than_half_a_second_is_told(tmp_path: Path) -> None:
     assert any(text.startswith("lasts 0.38 s: a search compares stretches of 0.5 s") for text in problems)
 
 
+def test_a_log_of_goals_alone_is_left_out_before_anything_is_simulated(tmp_path: Path) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    log = tmp_path / "arm/takes/slow.csv"
+    log.write_text("\n".join(",".join(line.split(",")[:3]) for line in log.read_text().splitlines()) + "\n")
+    check = session_check(load_session(tmp_path / "arm"))
+    assert check.damaged_takes == {"slow"}
+    assert "no joint has a position to compare with" in check.problems[Part("take", "slow")][0]
+
+
 def test_a_take_that_is_over_in_no_time_is_left_out(tmp_path: Path) -> None:
     shutil.copytree(ARM, tmp_path / "arm")
     log = tmp_path / "arm/takes/slow.csv"

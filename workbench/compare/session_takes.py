@@ -117,7 +117,7 @@ def readable(path: Path, model: RobotModel) -> Recording:
     if recording.channels:
         log = named_by_model(recording, model)
         read = [values for name, values in log.channels.items() if name.startswith("position.")]
-        if read and not any(np.isfinite(values).any() for values in read):
+        if not any(np.isfinite(values).any() for values in read):
             why = "".join(f"; {text}" for text in recording.problems[:1])
             raise InputError(path, f"no joint has a position to compare with{why}")
         return log

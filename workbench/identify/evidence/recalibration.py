@@ -12,14 +12,11 @@ from workbench.identify.evidence.nuisance import UNITS, changed_by, mixing, nomi
 from workbench.identify.results.findings import Recalibrated
 from workbench.robot import RobotModel
 
-_AT_END = 1e-3
-"""Of the end of its range [standard deviations]: a fit is there."""
-
 
 def list_changes(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
     """Nominal and recalibrated values, those that went furthest first."""
     sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
-    ended = {(n.joint, n.name) for n, by in z.items() if abs(by) >= FAR - _AT_END}
+    ended = {(n.joint, n.name) for n, by in z.items() if math.isclose(abs(by), FAR, rel_tol=1e-3)}
     out = []
     for (joint, name), by in changed_by(z).items():
         nominal = 0.0 if name == ZERO else nominal_value(model.servo(joint), name)
