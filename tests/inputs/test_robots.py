@@ -19,6 +19,7 @@ from workbench.simulation import Simulation, SimulationConfig
 
 COUNT = 2 * np.pi / 4096
 HIDDEN = 0.3
+"""Dry friction [N m], beyond the factor of 4.5 by which a law's own 0.05 may be recalibrated: up to that it is no finding."""
 
 
 @pytest.fixture(autouse=True)
