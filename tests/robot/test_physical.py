@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import refused
-from tests.inputs.corpus import SDF
+from tests.inputs.corpus import ROBOT, SDF
 from tests.inputs.corpus import SERVO as SERVO_FILE
 from workbench.compare.session import load_session
 from workbench.files import InputError
@@ -70,6 +70,16 @@ def test_a_material_that_no_foot_has_is_refused(tmp_path: Path, capsys: pytest.C
     assert f"robot.sdf: link 'r': {said}" in refused(capsys, "inspect", str(path))
     with pytest.raises(InputError, match="link 'r'"):
         MakeStation(RobotModel(str(path)))
+
+
+def test_a_material_of_a_urdf_is_checked_too(tmp_path: Path) -> None:
+    for name, value, said in (("mu_dynamic", "abc", "mu_dynamic: expected finite numbers"),
+                              ("mu_dynamic", "7", "friction: expected at most 5, got 7"),
+                              ("point_contact_stiffness", "0", "point_contact_stiffness: expected at least 10 N/m")):
+        material = DRAKE.format(f'<drake:{name} value="{value}"/>')
+        (tmp_path / "robot.urdf").write_text(ROBOT.replace("</geometry></collision>", f"</geometry>{material}</collision>"))
+        with pytest.raises(InputError, match=rf"robot\.urdf: link 'trunk': {said}"):
+            _ = RobotModel(str(tmp_path / "robot.urdf")).problems
 
 
 def test_the_ground_of_a_session_replaces_a_friction_that_no_foot_has(tmp_path: Path) -> None:

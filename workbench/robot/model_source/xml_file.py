@@ -107,8 +107,9 @@ def check_numbers(path: Path, root: Element) -> None:
         for element in owner.iter():
             if root.tag == "sdf" and element.tag in _NUMBERS and len(element) == 0:
                 _check(path, owner, str(element.tag), element.text or "")
-            if root.tag == "sdf" and str(element.tag).startswith(f"{{{DRAKE}}}"):
-                _check_material(path, owner, str(element.tag).partition("}")[2], element.text or "")
+            if str(element.tag).startswith(f"{{{DRAKE}}}"):
+                text = element.text if root.tag == "sdf" else element.get("value")
+                _check_material(path, owner, str(element.tag).partition("}")[2], text or "")
             for key in _ATTRIBUTES.get(str(element.tag), ()) if root.tag == "robot" else ():
                 if key in element.attrib:
                     _check(path, owner, key if key != "value" else element.tag, element.attrib[key])
