@@ -73,7 +73,7 @@ def test_a_name_that_no_host_has_is_one_line(tmp_path: Path, capsys: pytest.Capt
 
 @pytest.mark.parametrize(("text", "said"), [
     (f"# cycles: 2\n{POSES}# cycles: 3\n", "line 6: '# cycles: 3' after '# cycles: 2'; expected one number of cycles"),
-    ("time,flm,speed.flm\n0,0,0\n1,1,-5\n2,0,1\n", "row 2, joint flm: expected a moving speed of 0 deg/s or more, got -5"),
+    ("time,flm,speed.flm\n0,0,0\n1,1,-5\n2,0,1\n", "row 2, joint flm: expected a moving speed of 0 or more deg/s, got -5"),
     ("time,flm\n0,0\n1000,10\n2000,0\n", "(a table has seconds); add --yes if this is intended")])
 def test_a_table_that_contradicts_itself_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, said: str
                                                      ) -> None:
