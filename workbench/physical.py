@@ -88,6 +88,9 @@ N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V), XL-330 at i
 STRONGEST = 75.0
 """Stall torque times speed without load [W]: XH540 52, the strongest servos of model cars 66."""
 
+LEAST_KNOWN = 100.0
+"""Largest standard deviation of a servo's constant, by its value, or of its logarithm: whoever knows less should not give it."""
+
 GROUND: Mapping[str, PhysicalRange] = MappingProxyType({
     "friction": PhysicalRange("", most=5.0, low=0.02, high=1.5, why="feet on floors have", perhaps="a typing mistake"),
     "stiffness": PhysicalRange("N/m", least=10.0, low=200.0, why="floors that robots walk on have", infinite=True),

@@ -1,11 +1,17 @@
 """Results appear whole or not at all, and whether they can appear is known before the work."""
 
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from workbench.cli.output import output_directory
 from workbench.files import InputError
+from workbench.files.reading import write_whole
+from workbench.robot import puppy_model, save_model
 
 
 def test_appears_at_the_end_and_whole(tmp_path: Path) -> None:
@@ -70,6 +76,34 @@ def test_a_disk_that_fills_up_while_publishing_is_one_line(tmp_path: Path, monke
     with pytest.raises(InputError, match="No space left"), output_directory(tmp_path / "a") as folder:
         (folder / "x").write_text("1")
     assert not list(tmp_path.iterdir())
+
+
+@contextmanager
+def _largest_file(size: int) -> Iterator[None]:
+    """No file of this process grows beyond `size` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("write", [
+    lambda path: path.write_bytes(bytes(1 << 20)), lambda path: write_whole(path, bytes(1 << 20)),
+    lambda path: save_model(replace(puppy_model(), packages={f"p{k}": "/tmp" for k in range(20_000)}), path)])
+def test_a_file_that_cannot_be_written_whole_is_one_line_and_leaves_nothing(
+        tmp_path: Path, write: Callable[[Path], object]) -> None:
+    with pytest.raises(InputError, match=r"a(/x)?: cannot be written \(File too large\)"):
+        _fill_small(tmp_path / "a", write)
+    assert not list(tmp_path.iterdir())
+
+
+def _fill_small(out: Path, write: Callable[[Path], object]) -> None:
+    with output_directory(out) as folder:
+        (folder / "first").write_text("1")
+        with _largest_file(1 << 16):
+            write(folder / "x")
 
 
 def _fail(out: Path, error: BaseException) -> None:

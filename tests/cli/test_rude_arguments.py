@@ -11,6 +11,7 @@ from tests.command import refused
 from workbench.cli.main import main
 from workbench.cli.output import memory_folder
 
+ARM = Path(__file__).parents[2] / "data" / "tutorial_arm"
 POSES = "time,flm,frm\n0,0,0\n0.5,10,10\n1,0,0\n"
 
 
@@ -24,7 +25,8 @@ POSES = "time,flm,frm\n0,0,0\n0.5,10,10\n1,0,0\n"
     (("record", "localhost", "--name", "../up"), "expected a name that a file can have"),
     (("record", "localhost", "--name", ""), "expected a name that a file can have"),
     (("record", "localhost", "--name", "a,b"), "expected a name that a file can have"),
-    (("record", "localhost", "--name", "a\nb"), "expected a name that a file can have")])
+    (("record", "localhost", "--name", "a\nb"), "expected a name that a file can have"),
+    (("diagnose", "session.yaml", "--out", "out", "--memory", ""), "--memory: expected a folder")])
 def test_an_argument_out_of_range_is_one_line(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], said: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(arguments)
@@ -60,3 +62,27 @@ def test_the_memory_of_a_run_stays_where_it_is(tmp_path: Path) -> None:
     with memory_folder(tmp_path / "out"):
         (tmp_path / "out" / "memory").write_text("x")
     assert (tmp_path / "out" / "memory").is_file()
+
+
+@pytest.mark.parametrize(("host", "said"), [("", "expected a name or an address, got nothing"), ("a" * 300, "not a known host"),
+                                            ("a..b", "not a known host")])
+def test_a_name_that_no_host_has_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], host: str, said: str) -> None:
+    assert said in refused(capsys, "record", host, "--out", str(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (f"# cycles: 2\n{POSES}# cycles: 3\n", "line 6: '# cycles: 3' after '# cycles: 2'; expected one number of cycles"),
+    ("time,flm,speed.flm\n0,0,0\n1,1,-5\n2,0,1\n", "row 2, joint flm: expected a moving speed of 0 or more deg/s, got -5"),
+    ("time,flm\n0,0\n1000,10\n2000,0\n", "(a table has seconds); add --yes if this is intended")])
+def test_a_table_that_contradicts_itself_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, said: str
+                                                     ) -> None:
+    (tmp_path / "poses.csv").write_text(text)
+    assert said in refused(capsys, "simulate", str(tmp_path / "poses.csv"), "--out", str(tmp_path / "out"))
+
+
+def test_what_two_files_need_has_no_effect_on_a_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", str(ARM), "--cycles", "3", "--base", "fixed", "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
+    said = capsys.readouterr().err
+    for name in ("base", "cycles"):
+        assert f"warning: --{name} has no effect: each take of {ARM / 'session.yaml'} has its own" in said

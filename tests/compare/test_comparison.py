@@ -184,6 +184,38 @@ def test_any_two_files(folder, pair_files, a, b, error, floor):
         assert result.recorded.source == "recording"
 
 
+@pytest.fixture(scope="module")
+def spoilt(pair_files, tmp_path_factory) -> Path:
+    """Files that cannot be compared: tables of one row, of none, of another robot and without a position; takes that are short,
+    and of a robot that stands still."""
+    folder = tmp_path_factory.mktemp("spoilt")
+    table, take = (pair_files[kind].read_text().splitlines() for kind in ("rollout", "recording"))
+    head, rows = table[:4], table[4:]
+    start = next(k for k, line in enumerate(take) if line.startswith("Frame")) + 1
+    still = take[start].split(",", 2)[2]
+    for name, lines in {
+            "one": [*head, rows[0]], "none": head, "short": take[:start + 5],
+            "other": [*head[:3], head[3].replace("position.", "position.x"), *rows],
+            "blank": [*head, *(f"{row.split(',')[0]}{',' * row.count(',')}" for row in rows)],
+            "still": [*take[:start], *(f"{k},{k / 100:.3f},{still}" for k in range(100))]}.items():
+        (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("one", "holds 1 frame"), ("none", "line 5: is missing; expected a row for each frame"), ("short", "holds 5 frame"),
+    ("other", "no joint in common with the model"), ("blank", "no joint has a position"),
+    ("still", "yaw: no tracked joint turns")])
+def test_what_cannot_be_compared_is_refused_before_anything_is_simulated(folder, pair_files, spoilt, name, said):
+    def simulated(what: str, done: float | None = None) -> None:
+        pytest.fail(f"{what}, before its input was checked")
+
+    model, bad = load_session(session_of(folder, "run.yaml", wave="wave")).model, spoilt / f"{name}.csv"
+    for a, b in ((bad, pair_files["motion"]), (pair_files["motion"], bad)):
+        with pytest.raises(InputError, match=f"{name}.csv: {said}"):
+            compare_files(a, b, model, cycles=2, progress=simulated, base="fixed", n_jobs=1)
+
+
 @pytest.mark.slow
 def test_practice_session_without_hidden_physics():
     """Issue 2: joint errors within 1.3 times the noise on the stand, within 2 times walking."""

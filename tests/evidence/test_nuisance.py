@@ -19,6 +19,7 @@ from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.parameters import Candidate
 from workbench.robot import ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
+from workbench.view.report.words import suspect_constants
 
 SERVO = {"stall_torque": 0.7, "no_load_speed": 19.0, "rated_voltage": 7.4, "supply_voltage": 7.4, "coulomb_friction": 0.013,
          "viscous_friction": 0.004, "reflected_inertia": 0.0018, "proportional_gain": 1.15}
@@ -76,6 +77,9 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     (said, other) = list_changes(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
     assert (said.number, other.number) == ("back_emf", "coulomb_friction")
     assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
+    assert (said.at_end, other.at_end) == (True, False)
+    (warned,) = suspect_constants((said, other))
+    assert warned.startswith("back emf at j: adjusted from 0.243 to 0.0542 N m s/rad, as far")
 
 
 def test_all_numbers_recalibrated_as_far_as_they_go_are_still_those_of_a_servo(tmp_path):

@@ -213,10 +213,12 @@ def test_flash_builds_and_says_what_it_would_do_and_needs_a_yes(tmp_path: Path, 
     assert "ends after 5 cycles" in out
     assert "no port was opened" in out
     assert f"SHA-256: {hashlib.sha256((tmp_path / 'cm530.bin').read_bytes()).hexdigest()}" in out
-    assert main(["flash", walk, "--out", str(tmp_path)]) == 2
+    assert main(["flash", walk, "--out", str(tmp_path / "refused")]) == 2
     assert "say yes" in capsys.readouterr().err
-    assert main(["flash", walk, "--yes", "--port", "/dev/no-such-port", "--out", str(tmp_path)]) == 2
+    assert not (tmp_path / "refused").exists()
+    assert main(["flash", walk, "--yes", "--port", "/dev/no-such-port", "--out", str(tmp_path / "refused")]) == 2
     assert "no such port" in capsys.readouterr().err
+    assert not (tmp_path / "refused").exists()
     (tmp_path / "bad.table").write_bytes(b"WBTB")
     assert main(["flash", str(tmp_path / "bad.table"), "--dry-run", "--out", str(tmp_path)]) == 2
     assert "too short" in capsys.readouterr().err

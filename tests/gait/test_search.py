@@ -282,6 +282,11 @@ def test_options_that_cannot_be_met_end_in_one_line(capsys, tmp_path):
     out = ["--out", str(tmp_path / "out")]
     assert "expected at most 1.39 N m" in refused(capsys, "optimize", "--rms", "99", *out)
     assert STANDING in refused(capsys, "optimize", "--rms", "0.001", "--speed", "0.1", *out)
+    tight = refused(capsys, "optimize", "--arc", "1e-9", *out)
+    assert "expected 0.012 to 191 m on this robot, got 1e-09; tighter is a turn in place" in tight
+    for absurd in (("--speed", "1e300"), ("--turn", "1e9"), ("--arc", "0.3", "--speed", "500")):
+        assert "cannot be met by any gait: foot speed" in refused(capsys, "optimize", *absurd, *out)
+    assert "wider is straight ahead" in refused(capsys, "optimize", "--turn", "1e-6", "--speed", "0.1", *out)
     assert "neither of them max" in refused(capsys, "optimize", "--turn", "max", "--speed", "0.1", *out)
     assert "expected sideways, turn or arc" in refused(capsys, "optimize", "--right", *out)
     assert "the certificate is missing" in refused(capsys, "optimize", "--start", str(tmp_path / "gait.csv"), *out)

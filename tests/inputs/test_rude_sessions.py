@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.command import refused
 from tests.inputs.corpus import MODEL
 from workbench.compare.session import load_session
 from workbench.files import InputError
@@ -35,12 +36,41 @@ def test_entries_that_cannot_be_meant_are_told(tmp_path: Path) -> None:
         _slow(tmp_path, "load: {link: hand, mass: 200, at: [0, 0, 0]}")
 
 
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("name: slow", 'name: "a\\x07b"', r"takes\[0\]\.name: expected a name that can be a file's"),
+    ("format: 1", "format: true", "format: expected 1")])
+def test_entries_of_a_rude_kind_are_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    path = tmp_path / "arm/session.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(InputError, match=said):
+        load_session(path)
+
+
+def test_a_session_of_another_robot_names_its_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    path = tmp_path / "arm/session.yaml"
+    lines = [line for line in path.read_text().splitlines() if "model:" not in line and "base: base" not in line]
+    path.write_text("\n".join(lines) + "\n")
+    assert refused(capsys, "inspect", str(path)).count(f"{path}: ") == 1
+
+
 def test_a_take_of_less_than_half_a_second_is_told(tmp_path: Path) -> None:
     shutil.copytree(ARM, tmp_path / "arm")
     log = tmp_path / "arm/takes/slow.csv"
     log.write_text("".join(f"{line}\n" for line in log.read_text().splitlines()[:40]))
     problems = session_check(load_session(tmp_path / "arm")).problems[Part("take", "slow")]
     assert any(text.startswith("lasts 0.38 s: a search compares stretches of 0.5 s") for text in problems)
+
+
+def test_a_log_of_goals_alone_is_left_out_before_anything_is_simulated(tmp_path: Path) -> None:
+    shutil.copytree(ARM, tmp_path / "arm")
+    log = tmp_path / "arm/takes/slow.csv"
+    log.write_text("\n".join(",".join(line.split(",")[:3]) for line in log.read_text().splitlines()) + "\n")
+    check = session_check(load_session(tmp_path / "arm"))
+    assert check.damaged_takes == {"slow"}
+    assert "no joint has a position to compare with" in check.problems[Part("take", "slow")][0]
 
 
 def test_a_take_that_is_over_in_no_time_is_left_out(tmp_path: Path) -> None:
@@ -68,6 +98,28 @@ def test_an_edited_effect_asks_to_delete_the_posterior(tmp_path: Path) -> None:
 def test_a_negative_variance_is_refused(tmp_path: Path, variance: str) -> None:
     with pytest.raises(InputError, match=r"posterior\.covariance: expected a variance of backlash\(flm\)\.gap, got -"):
         load_model(_model(tmp_path, MODEL.replace("[[0.01]]", f"[[{variance}]]")))
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ("mean: [3.1]", "mean: [9]", r"mean: expected 3\.1 of backlash\(flm\)\.gap, as the effect has it, got 9; where an effect"),
+    ("gap: 3.1", "gap: 2.1", r"mean: expected 2\.1 of backlash\(flm\)\.gap"),
+    (", parameters: {gap: 3.1}}", ", parameters: {gap: 3.1}}\n- {effect: backlash, where: [frm], parameters: {gap: 1}}",
+     "posterior.names: expected those of the effects")])
+def test_a_posterior_of_other_effects_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in MODEL
+    with pytest.raises(InputError, match=said):
+        load_model(_model(tmp_path, MODEL.replace(old, new)))
+
+
+@pytest.mark.parametrize(("rows", "said"), [("[[1, 0.5], [0, 1]]", "the same numbers across the diagonal"),
+                                            ("[[1, 2], [2, 1]]", "no negative variance in any direction")])
+def test_a_matrix_that_is_no_covariance_is_refused(tmp_path: Path, rows: str, said: str) -> None:
+    text = MODEL.replace(", parameters: {gap: 3.1}}", ", parameters: {gap: 3.1}}\n"
+                         "- {effect: backlash, where: [frm], parameters: {gap: 1}}")
+    text = text.replace("[backlash(flm).gap], mean: [3.1], covariance: [[0.01]]",
+                        f"[backlash(flm).gap, backlash(frm).gap], mean: [3.1, 1], covariance: {rows}")
+    with pytest.raises(InputError, match=f"posterior.covariance: expected {said}"):
+        load_model(_model(tmp_path, text))
 
 
 def test_an_effect_given_twice_is_told(tmp_path: Path) -> None:

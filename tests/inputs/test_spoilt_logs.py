@@ -31,7 +31,7 @@ def _columns() -> Columns:
 
 def _text(columns: Columns) -> str:
     rows = np.column_stack(list(columns.values()))
-    return "\n".join([",".join(columns), *(",".join(f"{v:.7g}" for v in row) for row in rows)]) + "\n"
+    return "\n".join([",".join(columns), *(",".join("" if np.isnan(v) else f"{v:.7g}" for v in row) for row in rows)]) + "\n"
 
 
 def _problems(folder: Path, content: str | bytes) -> tuple[str, ...]:
@@ -42,6 +42,10 @@ def _problems(folder: Path, content: str | bytes) -> tuple[str, ...]:
 
 def _change(name: str, new: Callable[[Columns], np.ndarray]) -> Callable[[Columns], Columns]:
     return lambda columns: columns | {name: new(columns)}
+
+
+def _only(values: np.ndarray, there: np.ndarray) -> np.ndarray:
+    return np.where(there, values, np.nan)
 
 
 def _noise(columns: Columns) -> np.ndarray:
@@ -66,6 +70,10 @@ def test_a_sound_log_is_not_doubted(tmp_path: Path) -> None:
     (_change("current.hip", lambda c: 0 * c["time"] + 350), "current.hip: reaches 350; expected amperes"),
     (_change("temperature.hip", lambda c: 0 * c["time"] + 310), "is it in kelvin"),
     (_change("duty.hip", lambda c: (c["position.hip"] - c["goal.hip"]) / 50), "duty.hip: is opposite to the way"),
+    (_change("position.hip", lambda c: _only(c["position.hip"], np.arange(len(c["time"])) % 50 == 7)),
+     "position.hip: holds a reading in "),
+    (_change("goal.hip", lambda c: _only(c["goal.hip"], c["time"] < 0)), "goal.hip: blank in every row while the joint"),
+    (_change("goal.hip", lambda c: _only(c["goal.hip"], c["time"] >= 2)), "goal.hip: blank until 2.000 s while the joint"),
     (_change("time", lambda c: 100 * c["time"]), "is it the number of the row, or of the frame?"),
     (_change("time", lambda c: c["time"] / 3600), "are the times in hours?"),
     (lambda c: {name: values[:12] for name, values in c.items()}, "time: only 12 row(s)"),

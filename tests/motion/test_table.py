@@ -29,6 +29,23 @@ def test_the_thesis_figures_in_order_of_joints(walk: Motion) -> None:
     assert [table.goals[3, JOINTS.index(j)] for j in by_bus] == last
 
 
+def test_a_joint_whose_goal_stays_keeps_its_speed_where_a_robot_plays(walk: Motion, tmp_path: Path) -> None:
+    """The foot at 2 deg/s is sent the same goal again at once, in the first cycle before it has arrived."""
+    played = load_motion(save_motion(walk.as_sent(), tmp_path / "played.csv")).as_table()
+    table, frt = walk.as_table(), JOINTS.index("frt")
+    assert table.speeds[:2, frt].tolist() == [3, 0]
+    assert played.speeds[:2, frt].tolist() == [3, 3]
+    changed = played.speeds != table.speeds
+    assert changed.any()
+    assert not changed[0].any()
+    for k, j in np.argwhere(changed):
+        assert table.speeds[k, j] == 0
+        assert table.goals[k, j] == table.goals[k - 1, j]
+        assert played.speeds[k, j] == played.speeds[k - 1, j]
+    np.testing.assert_array_equal(played.goals, table.goals)
+    np.testing.assert_array_equal(played.dwells_ms, table.dwells_ms)
+
+
 def test_firmware_timing(walk: Motion) -> None:
     commands = walk.commands(cycles=3)
     assert commands.times[:6] == pytest.approx([0, 0.140, 0.243, 0.337, 0.468, 0.608])

@@ -45,6 +45,18 @@ def test_everything_comes_back(arm: RobotModel, tmp_path: Path) -> None:
     assert read.provenance == provenance
 
 
+def test_a_posterior_is_put_in_the_order_of_the_effects() -> None:
+    effects = (*EFFECTS, EffectSpec("zero_offset", ("two",), {"angle": 1.0}), EffectSpec("zero_offset", ("two",), {"angle": 2.0}))
+    names = parameter_names(effects)
+    n = len(names)
+    shuffled = (*reversed(range(n - 2)), n - 2, n - 1)
+    whole = np.arange(n * n).reshape(n, n) + np.arange(n * n).reshape(n, n).T
+    found = Posterior(tuple(names[k] for k in shuffled), np.array(shuffled), whole[np.ix_(shuffled, shuffled)]).in_order(effects)
+    assert found.names == names
+    np.testing.assert_array_equal(found.mean, np.arange(n))
+    np.testing.assert_array_equal(found.covariance, whole)
+
+
 def test_the_sdf_is_named_so_that_the_file_can_move_with_it(arm: RobotModel, tmp_path: Path) -> None:
     def said(path: Path, model: RobotModel) -> str:
         return str(yaml.safe_load(save_model(model, path).read_text())["robot"]["model"])

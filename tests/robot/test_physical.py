@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.command import refused
+from tests.inputs.corpus import ROBOT, SDF
 from tests.inputs.corpus import SERVO as SERVO_FILE
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.gait.ensemble import load_ensemble
 from workbench.inspect.problems import model_problems_of
 from workbench.physical import GROUND, MASS, SERVO, TIME_STEP
-from workbench.robot import Ground, load_model, load_servo_constants, puppy_model
+from workbench.robot import Ground, RobotModel, load_model, load_servo_constants, puppy_model
+from workbench.robot.law_covariance import LawCovariance
 from workbench.robot.servo_constants import ServoConstants
 from workbench.robot.torque_table import TorqueTable
-from workbench.simulation import SimulationConfig
+from workbench.simulation import MakeStation, SimulationConfig
 
 
 @pytest.mark.parametrize(("friction", "written", "said"), [
@@ -41,6 +44,54 @@ def test_the_verb_refuses_it_in_one_line(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / "model.yaml").write_text("format: 1\nrobot: {}\nground: {friction: 60}\n")
     said = refused(capsys, "inspect", str(tmp_path / "model.yaml"))
     assert said.endswith("model.yaml: ground.friction: expected at most 5, got 60")
+
+
+FRICTION = "<surface><friction><ode><mu>{0}</mu><mu2>{0}</mu2></ode></friction></surface>"
+DRAKE = '<drake:proximity_properties xmlns:drake="http://drake.mit.edu">{}</drake:proximity_properties>'
+
+
+def _sdf(folder: Path, material: str) -> Path:
+    (folder / "robot.sdf").write_text(SDF.replace("</geometry></collision>", f"</geometry>{material}</collision>"))
+    return folder / "robot.sdf"
+
+
+@pytest.mark.parametrize(("material", "said"), [
+    (FRICTION.format("1e6"), "friction: expected at most 5, got 1e+06; correct it, or state the ground's own friction"),
+    (DRAKE.format("<drake:mu_dynamic>7</drake:mu_dynamic>"), "friction: expected at most 5, got 7; correct it"),
+    (DRAKE.format("<drake:mu_dynamic>a</drake:mu_dynamic>"), "mu_dynamic: expected finite numbers of a usual size, found 'a'"),
+    (DRAKE.format("<drake:mu_static>nan</drake:mu_static>"), "mu_static: expected finite numbers of a usual size, found 'nan'"),
+    (DRAKE.format("<drake:point_contact_stiffness>1e-3</drake:point_contact_stiffness>"),
+     "point_contact_stiffness: expected at least 10 N/m, got 0.001"),
+    (DRAKE.format("<drake:hunt_crossley_dissipation>1e9</drake:hunt_crossley_dissipation>"),
+     "hunt_crossley_dissipation: expected at most 100000 s/m, got 1e+09")])
+def test_a_material_that_no_foot_has_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], material: str, said: str
+                                                ) -> None:
+    path = _sdf(tmp_path, material)
+    assert f"robot.sdf: link 'r': {said}" in refused(capsys, "inspect", str(path))
+    with pytest.raises(InputError, match="link 'r'"):
+        MakeStation(RobotModel(str(path)))
+
+
+def test_a_material_of_a_urdf_is_checked_too(tmp_path: Path) -> None:
+    for name, value, said in (("mu_dynamic", "abc", "mu_dynamic: expected finite numbers"),
+                              ("mu_dynamic", "7", "friction: expected at most 5, got 7"),
+                              ("point_contact_stiffness", "0", "point_contact_stiffness: expected at least 10 N/m")):
+        material = DRAKE.format(f'<drake:{name} value="{value}"/>')
+        (tmp_path / "robot.urdf").write_text(ROBOT.replace("</geometry></collision>", f"</geometry>{material}</collision>"))
+        with pytest.raises(InputError, match=rf"robot\.urdf: link 'trunk': {said}"):
+            _ = RobotModel(str(tmp_path / "robot.urdf")).problems
+
+
+def test_the_ground_of_a_session_replaces_a_friction_that_no_foot_has(tmp_path: Path) -> None:
+    model = RobotModel(str(_sdf(tmp_path, FRICTION.format("1e6"))), ground=Ground(friction=0.6))
+    assert model.problems == ()
+    assert MakeStation(model).plant().num_actuators() == 1
+    assert MakeStation(replace(model, ground=Ground()), SimulationConfig(base="fixed")).plant().num_actuators() == 1
+
+
+def test_an_unlikely_friction_of_a_foot_is_told(tmp_path: Path) -> None:
+    (told,) = RobotModel(str(_sdf(tmp_path, FRICTION.format("3")))).problems
+    assert told.startswith("link 'r': friction: 3 is more than feet on floors have (1.5)")
 
 
 def test_ensembles_draw_only_what_an_effect_can_have(tmp_path: Path) -> None:
@@ -97,3 +148,12 @@ def test_a_standard_deviation_beyond_its_value_is_told(tmp_path: Path) -> None:
     (tmp_path / "servo.yaml").write_text(SERVO_FILE.replace("supply_voltage: 11.1", "supply_voltage: {value: 11.1, sd: 1000}"))
     (told,) = load_servo_constants(tmp_path / "servo.yaml").doubts
     assert told.startswith("supply_voltage: sd 1000 is more than 3 times its value")
+
+
+def test_a_constant_of_which_nothing_is_known_is_refused(tmp_path: Path) -> None:
+    given = "supply_voltage: {value: 11.1, sd: 1.0e+30}"
+    (tmp_path / "servo.yaml").write_text(SERVO_FILE.replace("supply_voltage: 11.1", given))
+    with pytest.raises(InputError, match=r"supply_voltage: sd: expected at most 100 times the value, got 1e\+30"):
+        load_servo_constants(tmp_path / "servo.yaml")
+    with pytest.raises(InputError, match=r"covariance: expected variances of at most 10000, got 1e\+30"):
+        LawCovariance(("back_emf",), ((1e30,),))

@@ -67,7 +67,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
         tell("the cameras' recording", None)
         capture = _film(virtual, played, folder / f"{name}.csv", seed)
     save_registers(registers, folder / "registers.yaml")
-    save_motion(motion, folder / f"{name}_motion.csv")
+    save_motion(motion.as_sent(), folder / f"{name}_motion.csv")
     takes = _takes(name, cycles, base, played, capture)
     session = write_session(folder, model, takes, "registers.yaml")
     warnings = [f"register {d}" for d in registers.departures(model)] + list(capture.problems if capture else ())
@@ -101,7 +101,7 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
     if virtual is not None:
         tell("the cameras' recording", None)
         capture = _film(virtual, played, folder / f"{name}.csv", seed)
-    save_motion(motion, folder / f"{name}_motion.csv")
+    save_motion(motion.as_sent(), folder / f"{name}_motion.csv")
     table_said = {"motion": f"{name}_motion.csv", "cycles": cycles, "base": base}
     takes = [{"name": name, "recording": f"{name}.csv", **table_said}] if capture is not None else []
     takes.append({"name": f"{name}_joints", "recording": f"{name}_joints.csv", **table_said,

@@ -59,7 +59,7 @@ def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool
     problems = motion_problems(motion, cycles)
     warn(verb, [f"{motion.source}: {summarize(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
-        raise InputError(motion.source, f"{text} Add --yes if this is intended")
+        raise InputError(motion.source, f"{text}; add --yes if this is intended")
     _ask(motion.source, motion.seconds(cycles), yes)
 
 
@@ -132,4 +132,4 @@ def _ask(what: str, seconds: float, yes: bool) -> None:
 
     text = long_work(seconds)
     if text and not yes:
-        raise InputError(None, f"{what}: {text} Add --yes if this is intended")
+        raise InputError(None, f"{what}: {text}; add --yes if this is intended")

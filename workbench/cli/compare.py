@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "the session's own; of two files, the bundled puppy")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
                         help="foot-ground contact model (default: point)")
-    parser.add_argument("--base", choices=("free", "fixed"), default="free",
+    parser.add_argument("--base", choices=("free", "fixed"),
                         help="base of A and B; a session specifies its own (default: free)")
     add_cycles(parser, 1)
     add_yes(parser)
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Compares, writes, and prints the table."""
     from workbench.api.sessions import compare_session
     from workbench.cli.output import output_directory
-    from workbench.cli.progress import Progress
+    from workbench.cli.progress import Progress, warn
     from workbench.compare.compare_files import compare_files
     from workbench.compare.session import load_session
     from workbench.simulation import SimulationConfig
@@ -57,14 +57,16 @@ def run(args: argparse.Namespace) -> int:
             if args.model != PUPPY:
                 session = session.with_model(load_model(args.model, args.packages))
             warned = check_session("compare", session, args.yes)
+            unused = [name for name in ("base", "cycles") if getattr(args, name) is not None]
+            warn("compare", [f"--{name} has no effect: each take of {session.path} has its own" for name in unused])
             result = compare_session(session, config, progress=progress, jobs=args.jobs,
                                      finer_steps="drake" if args.engine == "drake" else "judged")
             comparison, written = result.comparison, result.save(folder, progress)
         else:
             model = load_model(args.model, args.packages)
             check_files("compare", (args.a, args.b), model, args.cycles, args.yes)
-            comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base, progress=progress,
-                                       n_jobs=args.jobs)
+            comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base or "free",
+                                       progress=progress, n_jobs=args.jobs)
             written = write_comparison(comparison, model, folder, f"{args.a} and {args.b}", progress)
     print(comparison.table())
     say_left_out("compare", comparison.left_out, warned)

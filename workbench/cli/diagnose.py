@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from workbench.cli.check import add_yes, check_session, say_left_out
-from workbench.cli.options import add_engine, add_out, positive
+from workbench.cli.options import add_engine, add_out, folder, positive
 
 if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
@@ -32,8 +32,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
-    parser.add_argument("--memory", metavar="DIR", help="directory for cached rollouts, shared by diagnoses of the same takes "
-                        "(default: next to --out, deleted on success)")
+    parser.add_argument("--memory", metavar="DIR", type=folder, help="directory for cached rollouts, shared by diagnoses of "
+                        "the same takes (default: next to --out, deleted on success)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and report it)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     return diagnose_and_report(args.session, args.out, args.jobs, **options)
 
 
-def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: bool = False, memory: str | None = None,
+def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: bool = False, memory: Path | None = None,
                         without: tuple[str, ...] = (), yes: bool = False, previous: str | None = None,
                         engine: Literal["auto", "drake"] = "auto") -> int:
     """Diagnoses the session at `path`, writes the results into `out` and prints the verdict; returns the exit code.
@@ -64,7 +64,7 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
-    from workbench.view.report.words import hidden_effects, said_aside
+    from workbench.view.report.words import hidden_effects, said_aside, suspect_constants
 
     session, before = load_session(path), None if previous is None else Path(previous)
     warned = check_session("diagnose", session, yes)
@@ -76,6 +76,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     say_left_out("diagnose", diagnosis.left_out, warned)
     if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
+    for sentence in suspect_constants(diagnosis.recalibrated):
+        print(f"workbench diagnose: warning: {sentence}", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")
     for tied in diagnosis.tied:
         print(f"  {tied.in_words()}")

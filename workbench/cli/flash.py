@@ -5,10 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.cli.check import check_certificate_of, check_table_of
 from workbench.cli.options import add_model, load_model, positive
+
+if TYPE_CHECKING:
+    from workbench.device.controller.loader_profile import LoaderProfile
+    from workbench.device.controller.program import Program
+    from workbench.device.controller.serial_line import SerialLine
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -37,16 +44,33 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Builds, asks, loads, and saves the transcript."""
-    from workbench.cli.progress import Progress
-    from workbench.device.controller.loader import FACTORY, MOVES, LoadError, Loading, Transcript
+    """Builds, asks, loads, and saves the transcript. Whoever says no finds the folder as it was."""
+    from workbench.cli.output import output_directory
+    from workbench.device.controller.loader import FACTORY, MOVES
     from workbench.device.controller.loader_profile import load_loader_profile
-    from workbench.device.controller.program import build_program
-    from workbench.files import InputError
-    from workbench.files.reading import write_whole
-    from workbench.motion import load_motion
 
     profile = load_loader_profile(args.loader)
+    with ExitStack() as opened:
+        with output_directory(args.out) as folder:
+            program = _build(args, profile, folder)
+            print(FACTORY)
+            print(MOVES)
+            line = None if args.dry_run else opened.enter_context(closing(_agreed_line(args, profile.rate)))
+        if line is not None:
+            _load(line, profile, program, args.out)
+            return 0
+    print(f"dry run: would hold '{profile.key.decode()}' at {profile.rate} bit/s until the loader's prompt, send "
+          f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
+          f"{profile.keep.decode()} and {profile.start.decode()}, and wait for the program's word; no port was opened")
+    return 0
+
+
+def _build(args: argparse.Namespace, profile: LoaderProfile, folder: Path) -> Program:
+    """The program with the motion, checked; it tells what it is."""
+    from workbench.cli.progress import Progress
+    from workbench.device.controller.program import build_program
+    from workbench.motion import load_motion
+
     with Progress("flash") as progress:
         progress("building")
         model = load_model(args.model, args.packages)
@@ -54,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
             check_table_of("flash", args.motion, model, args.force)
         else:
             check_certificate_of("flash", args.motion, load_motion(args.motion, model), model, args.force)
-        program = build_program(args.motion, model, profile, args.out, args.cycles, args.force, args.endless)
+        program = build_program(args.motion, model, profile, folder, args.cycles, args.force, args.endless)
     for violation in program.violations:
         print(f"workbench flash: warning: {violation}", file=sys.stderr)
     table = program.table.table
@@ -64,34 +88,36 @@ def run(args: argparse.Namespace) -> int:
     if not profile.confirmed:
         print(f"workbench flash: warning: the texts in {profile.source} are not confirmed on a real controller, "
               "and those after LOAD are unpublished; it stops at the first that differs (see the transcript)", file=sys.stderr)
-    print(FACTORY)
-    print(MOVES)
-    if args.dry_run:
-        print(f"dry run: would hold '{profile.key.decode()}' at {profile.rate} bit/s until the loader's prompt, send "
-              f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
-              f"{profile.keep.decode()} and {profile.start.decode()}, and wait for the program's word; no port was opened")
-        return 0
-    if not args.yes and not _confirm():
-        raise InputError("flash", "not loaded: say yes, or give --yes")
-    line = _line(args.port, profile.rate)
+    return program
+
+
+def _load(line: SerialLine, profile: LoaderProfile, program: Program, out: Path) -> None:
+    """Loads and starts the program. The transcript is kept in `out`, whatever happens."""
+    from workbench.cli.progress import Progress
+    from workbench.device.controller.loader import LoadError, Loading, Transcript
+    from workbench.files import InputError
+    from workbench.files.reading import write_whole
+
     transcript = Transcript()
-    kept = args.out / f"transcript-{time.strftime('%Y%m%d-%H%M%S')}.txt"
+    kept = out / f"transcript-{time.strftime('%Y%m%d-%H%M%S')}.txt"
     try:
         with Progress("flash") as progress:
             state = Loading(line, profile, transcript, progress).run(program.image)
     except LoadError as e:
         raise InputError("flash", f"{e} (transcript: {kept})") from None
     finally:
-        line.close()
         write_whole(kept, transcript.text)
     print(f"started: it is at {state.state.name.lower()}, woke from {state.woke_from}; transcript: {kept}")
-    return 0
 
 
-def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its module is imported late
+def _agreed_line(args: argparse.Namespace, rate: int) -> SerialLine:
+    """The controller's port, once the user agrees to replace the program; InputError where not."""
     from workbench.device.controller.serial_line import SerialLine, default_port
+    from workbench.files import InputError
 
-    line = SerialLine(port or default_port(), rate)
+    if not args.yes and not _confirm():
+        raise InputError("flash", "not loaded: say yes, or give --yes")
+    line = SerialLine(args.port or default_port(), rate)
     line.lines_low()
     return line
 

@@ -21,16 +21,16 @@ STAYS = 16
 
 
 @contextmanager
-def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> Iterator[Path]:
+def rollout_memory(out: Path, session: Session, kept_in: Path | None = None) -> Iterator[Path]:
     """A folder beside `out` for rollouts of this session, the same for the same files and versions. It is kept if the block is
     interrupted or fails with an internal error, and deleted, with those of other versions, once it succeeds or its input is
     refused. kept_in: a folder to use instead, which is never deleted."""
     if kept_in is not None:
         try:
-            Path(kept_in).mkdir(parents=True, exist_ok=True)
+            kept_in.mkdir(parents=True, exist_ok=True)
         except OSError as e:
             raise InputError(kept_in, f"cannot be written ({e.strerror})") from None
-        yield Path(kept_in)
+        yield kept_in
         return
     beside = Path(os.path.abspath(out))
     kept = f".{beside.name}.resume-"

@@ -40,7 +40,7 @@ def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None
     """--out: the folder for results."""
     kept = "; created if missing, other files in it are kept"
     parser.add_argument(
-        "--out", metavar="DIR", type=_folder, required=default is None, default=default and Path(default),
+        "--out", metavar="DIR", type=folder, required=default is None, default=default and Path(default),
         help=f"folder for the results{kept}" + (f" (default: {default})" if default else ""))
 
 
@@ -50,7 +50,7 @@ def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
                         help=f"auto: {auto}; drake: all rollouts by Drake, much slower (default: auto)")
 
 
-def _folder(text: str) -> Path:
+def folder(text: str) -> Path:
     """A folder's path, for argparse; refuses an empty one, which is an unset shell variable rather than the current folder."""
     if not text or "\0" in text:
         raise argparse.ArgumentTypeError("expected a folder")

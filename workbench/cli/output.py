@@ -13,7 +13,8 @@ from pathlib import Path
 from workbench.files import InputError
 from workbench.files.numerals import whole_of
 
-_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""No room on the disk, in the user's quota, or in a file (ulimit -f)."""
 
 
 LEFT = ".workbench-"

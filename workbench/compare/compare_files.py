@@ -13,9 +13,10 @@ from workbench.compare.comparison import compare_takes
 from workbench.compare.options import COMPARE
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
-from workbench.compare.session_takes import ReadTake, RegisteredTake, readable, register_take
+from workbench.compare.session_takes import ReadTake, RegisteredTake, check_length, readable, register_take
 from workbench.files import InputError
 from workbench.motion import load_motion
+from workbench.motion.commands import Commands
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.mocap.tracks import check_assets
@@ -44,10 +45,12 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     files = Path(a), Path(b)
     made_by = {"recorded": str(a), "simulated": str(b)}
     recording = _read(files[0], model, base) if kinds[0] == "recording" else None
+    tables = {i: _table(f, model, "motion" in kinds) for i, (f, kind) in enumerate(zip(files, kinds)) if kind == "rollout"}
     runs = {i: _run(f, model, cycles, base, recording) for i, (f, kind) in enumerate(zip(files, kinds)) if kind == "motion"}
+    if recording is not None and runs:
+        _check_registers(recording, runs[1].commands)
     rollouts = dict(zip(runs, roll_out(list(runs.values()), config, progress=progress, n_jobs=n_jobs)))
-    takes = [rollouts[i].nominal if i in rollouts else load_rollout(f) if kind == "rollout" else None
-             for i, (f, kind) in enumerate(zip(files, kinds))]
+    takes = [rollouts[i].nominal if i in rollouts else tables.get(i) for i in range(2)]
     finer = rollouts[1].finer if 1 in rollouts else ()
     other = rollouts[1].other_contact if 1 in rollouts else ()
     progress("comparing", None)
@@ -112,6 +115,27 @@ def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
     if recording.rigid_bodies:
         check_assets(recording, model)
     return ReadTake(TakeSpec(path.stem, path, base=base), model, recording, recording.commands)
+
+
+def _table(path: Path, model: RobotModel, beside_motion: bool) -> Take:
+    """A rollout's table that can be compared. beside_motion: with a motion of the model."""
+    take = load_rollout(path)
+    check_length(path, take.time)
+    seen = [j for j, column in zip(take.joints, take.q.T) if np.isfinite(column).any()]
+    if not seen:
+        raise InputError(path, "no joint has a position to compare with")
+    if beside_motion and not set(seen) & set(model.joints):
+        raise InputError(path, f"no joint in common with the model ({', '.join(model.joints[:3])}, …); expected takes of one "
+                               "robot")
+    return take
+
+
+def _check_registers(read: ReadTake, commands: Commands | None) -> None:
+    """InputError, before anything is simulated, for a capture that cannot be brought into the model's frame and clock."""
+    try:
+        register_take(replace(read, commands=read.commands or commands), None, None)
+    except InputError as e:
+        raise InputError(read.spec.recording if e.source is None else e.source, e.problem) from None
 
 
 def _run(path: Path, model: RobotModel, cycles: int | None, base: Base, beside: ReadTake | None) -> Run:

@@ -174,8 +174,8 @@ def _predict(f: Fields, model: RobotModel) -> PredictSpec:
 
 def _entry_name(f: Fields) -> str:
     name = str(f.required("name", f.text("name")))
-    if name != Path(name).name or name in (".", "..") or len(name.encode()) > FILES.longest_name:
-        raise f.error("name", f"expected a name that can be a file's, of at most {FILES.longest_name} bytes, got '{name[:40]}'")
+    if name != Path(name).name or name in (".", "..") or len(name.encode()) > FILES.longest_name or not name.isprintable():
+        raise f.error("name", f"expected a name that can be a file's, of at most {FILES.longest_name} bytes, got {name[:40]!r}")
     return name
 
 

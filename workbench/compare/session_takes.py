@@ -30,7 +30,7 @@ from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
 from workbench.robot import RobotModel
 from workbench.simulation import Start
-from workbench.types import Progress, no_progress
+from workbench.types import Array, Progress, no_progress
 
 LeftOut = tuple[tuple[str, str], ...]
 
@@ -113,14 +113,11 @@ def readable(path: Path, model: RobotModel) -> Recording:
     """Reads a recording that can be compared: InputError if it cannot be read, has too few frames, is over in no time, or has
     neither visible rigid bodies nor joints."""
     recording = read_recording(path)
-    if len(recording.time) < FILES.fewest_frames:
-        raise InputError(path, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
-    if (seconds := float(np.ptp(recording.time))) < FILES.least_seconds:
-        raise InputError(path, f"lasts {seconds:.3g} s; expected {FILES.least_seconds:g} s or more: are its times in seconds?")
+    check_length(path, recording.time)
     if recording.channels:
         log = named_by_model(recording, model)
         read = [values for name, values in log.channels.items() if name.startswith("position.")]
-        if read and not any(np.isfinite(values).any() for values in read):
+        if not any(np.isfinite(values).any() for values in read):
             why = "".join(f"; {text}" for text in recording.problems[:1])
             raise InputError(path, f"no joint has a position to compare with{why}")
         return log
@@ -132,6 +129,14 @@ def readable(path: Path, model: RobotModel) -> Recording:
     if all(model.rigid_bodies.get(asset) in model.kinematics.links for asset in recording.rigid_bodies):
         _check_stands(path, recording, model)
     return recording
+
+
+def check_length(path: Path, time: Array) -> None:
+    """InputError where a take's times (N,) [s] are too few to compare, or over in no time."""
+    if len(time) < FILES.fewest_frames:
+        raise InputError(path, f"holds {len(time)} frame(s); expected {FILES.fewest_frames} or more")
+    if (seconds := float(np.ptp(time))) < FILES.least_seconds:
+        raise InputError(path, f"lasts {seconds:.3g} s; expected {FILES.least_seconds:g} s or more: are its times in seconds?")
 
 
 def _check_stands(path: Path, recording: Recording, model: RobotModel) -> None:

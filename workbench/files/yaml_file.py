@@ -278,7 +278,7 @@ def top_of(path: Path, *keys: str) -> Fields:
     version = top.raw("format")
     if version is None:
         top.only("format", *keys)
-    if version != 1:
+    if version != 1 or isinstance(version, bool):
         raise top.error("format", "expected 1")
     top.only(*keys)
     return top

@@ -13,19 +13,23 @@ from workbench.gait.limits import Margin
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.shape import KNEES, GaitShape
-from workbench.gait.space import in_range, random_shape, space_of
+from workbench.gait.space import in_range, random_shape, space_of, tightest_arc
 from workbench.gait.table import paths_of
 from workbench.types import Array
 
 STANDING = "RMS torque of standing still"
 WITHOUT_NEAREST = ("slope", STANDING)
 """Limits beside which there is no nearest table."""
+ABSURD = 10.0
+"""Use of a limit beyond which a request is a slip of the pen, and nobody waits for the nearest gait."""
 CROUCHES = (0.0, 0.05, 0.15, 0.3, 0.45)
 """By leg length, in which standing still is tried."""
 HELD = 0.5
 """Share of the torque of standing still that the friction of servos at rest may hold instead of their motors."""
 PATHS = 400
 """Random foot paths among which one must be possible."""
+ARC_FROM_STRAIGHT = 0.1
+"""Least curvature of an arc, by the drift that a straight gait may have: no gait keeps a radius that well."""
 CARRIED = 0.6
 """Share of the required speed that a foot path must have: a body is carried on in the air and slides, too; small trots went half
 as fast again as their feet."""
@@ -34,7 +38,8 @@ as fast again as their feet."""
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
     """The first limit that no gait can meet: a speed beyond the feet's at the servos' no-load speed, or that no path of feet has
     within the ranges and speeds of joints; a slope beyond friction; a torque limit below the torque of standing. InputError for a
-    limit on torque above the torque of the servos."""
+    limit on torque above the torque of the servos, and for an arc tighter than any stride, or as good as straight."""
+    _check_arc(machine, request)
     most = float(machine.law.full_torque.max())
     if request.limits.rms is not None and request.limits.rms > most:
         raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, the servos' torque at full duty, "
@@ -43,6 +48,20 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
         if margin is not None and margin.use > 1:
             return margin
     return _path(machine, request)
+
+
+def has_nearest(impossible: Margin) -> bool:
+    """Whether a request that exceeds this limit is answered with the nearest table."""
+    return impossible.name not in WITHOUT_NEAREST and impossible.use <= ABSURD
+
+
+def _check_arc(machine: GaitMachine, request: Request) -> None:
+    if request.radius is None:
+        return
+    least, most = tightest_arc(machine), 1 / (ARC_FROM_STRAIGHT * request.limits.drift)
+    if not least <= request.radius <= most:
+        raise InputError(None, f"radius of an arc: expected {least:.3f} to {most:.0f} m on this robot, got {request.radius:g}; "
+                               + ("tighter is a turn in place" if request.radius < least else "wider is straight ahead"))
 
 
 def _foot_speed(machine: GaitMachine, request: Request) -> Margin | None:

@@ -19,7 +19,7 @@ from workbench.gait.certify import Certified, CertifyOptions, Examination, Other
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
-from workbench.gait.feasibility import WITHOUT_NEAREST, out_of_reach
+from workbench.gait.feasibility import has_nearest, out_of_reach
 from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
@@ -223,9 +223,9 @@ def sought(request: Request) -> Request:
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
              progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
     """The answer to a speed that no gait has: the nearest table, after a first search for the fastest. On a slope on which
-    nothing stands, or with servos that may not even hold it up, there is none."""
+    nothing stands, with servos that may not even hold it up, or to a speed in another unit there is none."""
     problem = f"cannot be met by any gait: {impossible}"
-    if impossible.name in WITHOUT_NEAREST:
+    if not has_nearest(impossible):
         return Optimized(request, False, problem, None, None, None)
     progress(f"{problem}; looking for the nearest that works", None)  # before the search, which takes half a minute
     look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,

@@ -22,6 +22,8 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "hurry": (0.8, 2.0)}
 TRIM = 0.06
 """Turn in a stance [rad] by which a straight gait steers against its own drift: robots are not exactly symmetric."""
+SHORTEST = 0.08
+"""Stride along the way, by leg length; strides across it, and those of a turn in place, are no longer."""
 MOST_TURN = 1.2
 """Of the body in one stance [rad]."""
 POSES = (2.0, 8.0)
@@ -77,10 +79,15 @@ def space_of(machine: GaitMachine, request: Request) -> Space:
     return Space(names, low, high)
 
 
+def tightest_arc(machine: GaitMachine) -> float:
+    """Least radius [m] of an arc within every box: the shortest stride at the greatest turn in a stance."""
+    return SHORTEST * machine.leg_length / MOST_TURN
+
+
 def _strides(request: Request, length: float) -> dict[str, tuple[float, float]]:
     """Ranges of stride, side [m] and turn [rad]."""
-    along, trim = (0.08 * length, 0.95 * length), (-TRIM, TRIM)
-    little = (-0.08 * length, 0.08 * length)
+    along, trim = (SHORTEST * length, 0.95 * length), (-TRIM, TRIM)
+    little = (-SHORTEST * length, SHORTEST * length)
     if request.way == "backward":
         return {"stride": (-along[1], -along[0]), "turn": trim}
     if request.way == "sideways":

@@ -171,11 +171,12 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
     slight = not findings and not unknown and not left and found.is_slight()
     progress("rolling out the fitted model", None)
+    model = found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed)))
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(gap) and not slight, findings, (*left, *unknown)),
-        model=found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
+        model=model, nominal=session.model,
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
-        posterior=found.posterior((*build.measured, *found.missed)),
+        posterior=found.posterior((*build.measured, *found.missed)).in_order(model.effects),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | describe_logging([e.take for e in evidence], laws)

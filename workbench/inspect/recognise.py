@@ -291,7 +291,7 @@ def _session(path: Path) -> Inspection:
     problems = [f"{of}: {text}" for of, lines in check.problems.items() for text in lines]
     takes = {t.name for t in session.takes}
     none_left = bool(takes) and takes <= check.damaged_takes and not session.predict
-    lost = check.refused or ("none of its takes can be used" if none_left else "")
+    lost = (check.refused or "").removeprefix(f"{session.path}: ") or ("none of its takes can be used" if none_left else "")
     logged = _describe_logging(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,

@@ -107,13 +107,16 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
 
 def _cycles(path: str | Path, text: str) -> int | None:
     """The number of cycles in the file's comment; None without one."""
+    cycles: int | None = None
     for n, line in enumerate(text.splitlines(), start=1):
         if line.startswith(CYCLES):
             value = whole_of(line.removeprefix(CYCLES).strip())
             if value is None or not 1 <= value <= MOST_CYCLES:
                 raise InputError(path, f"line {n}: expected '{CYCLES} N' with N from 1 to {MOST_CYCLES}, found '{line[:40]}'")
-            return value
-    return None
+            if cycles not in (None, value):
+                raise InputError(path, f"line {n}: '{line[:40]}' after '{CYCLES} {cycles}'; expected one number of cycles")
+            cycles = value
+    return cycles
 
 
 def _sections(path: str | Path, names: list[str], rows: list[Line]) -> tuple[int, int, list[str], list[Line]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from html import escape
 
@@ -64,7 +65,8 @@ class Motion:
         if self.speeds is not None:
             for k, i in np.argwhere(~(np.isfinite(self.speeds) & (self.speeds >= 0)))[:1]:
                 place = f"row {k + 1}, joint {self.joints[i]}"
-                raise InputError(self.source, f"{place}: expected a moving speed of 0 or more, got {self.speeds[k, i]}")
+                raise InputError(self.source, f"{place}: expected a moving speed of 0 or more deg/s, got "
+                                              f"{math.degrees(self.speeds[k, i]):.6g}")
         for k in np.flatnonzero(~np.isfinite(self.times))[:1]:
             raise InputError(self.source, f"row {k + 1}: expected a finite time, got {self.times[k]}")
         for k in np.flatnonzero(np.diff(self.times) <= 0)[:1]:
@@ -81,6 +83,10 @@ class Motion:
         first = np.zeros((1, len(table.joints))) if table.start else angles[last:last + 1]
         return Motion(table.source, times, table.joints, np.vstack([first, angles]), table.source,
                       np.vstack([speeds[last:last + 1], speeds]), table.units, table.start, table.stop)
+
+    def as_sent(self) -> Motion:
+        """The motion as a robot plays it that never gets a speed of 0 (`PoseTable.as_sent`), in whole counts."""
+        return replace(Motion.from_table(self.as_table().as_sent()), cycles=self.cycles)
 
     @property
     def duration(self) -> float:

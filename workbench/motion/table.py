@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -81,6 +81,17 @@ class PoseTable:
         every = np.arange(len(self))
         last = len(self) - self.stop
         return np.concatenate([every[:self.start], np.tile(every[self.start:last], cycles), every[last:]])
+
+    def as_sent(self) -> PoseTable:
+        """The table with the speeds that `play` and the controller's program send: where a pose has speed 0, at once, and the
+        goal of the pose before, a joint may still be on its way there, and keeps its speed. The first pose of a section is left
+        as it is, since more than one pose may come before it."""
+        speeds = self.speeds.copy()
+        for k in range(1, len(self)):
+            if k not in (self.start, len(self) - self.stop):
+                stays = (speeds[k] == 0) & (self.goals[k] == self.goals[k - 1])
+                speeds[k, stays] = speeds[k - 1, stays]
+        return replace(self, speeds=speeds)
 
     def part(self, section: Section) -> PoseTable | None:
         """The poses of one section as a table without sections; None where it has none."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from workbench.files import InputError
+from workbench.physical import LEAST_KNOWN
 from workbench.types import Array
 
 
@@ -56,6 +57,8 @@ class LawCovariance:
         scale = float(np.max(np.diag(C), initial=0.0))
         if not np.isfinite(C).all() or not np.allclose(C, C.T, atol=1e-9 * scale):
             raise InputError(None, "covariance: expected finite numbers, the same across the diagonal")
+        if n and float(np.diag(C).max()) > LEAST_KNOWN**2:
+            raise InputError(None, f"covariance: expected variances of at most {LEAST_KNOWN**2:g}, got {np.diag(C).max():g}")
         if n and float(np.linalg.eigvalsh(C)[0]) < -1e-9 * scale:
             raise InputError(None, "covariance: expected no negative variance in any direction")
 

@@ -107,7 +107,7 @@ class RobotModel:
     @cached_property
     def problems(self) -> tuple[str, ...]:
         """Problems of the description, one line each; InputError where Drake cannot build it."""
-        return (*self.source.problems, *model_problems(self.path, self.source.source))
+        return (*self.source.problems, *model_problems(self.path, self.source.source, slides=self.ground.friction is None))
 
     @cached_property
     def held_problems(self) -> tuple[str, ...]:

@@ -22,6 +22,10 @@ from workbench.robot.robot_section import check_protocol, read_model, read_servo
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.types import Array
 
+_EDITED = "where an effect was edited, delete `posterior`, which is of the effects as they were fitted"
+_SAME = 1e-6
+"""Relative difference of numbers that are the same; files have them with six digits and more."""
+
 
 @dataclass(frozen=True)
 class Posterior:
@@ -40,6 +44,18 @@ class Posterior:
         if np.shape(self.mean) != (n,) or np.shape(self.covariance) != (n, n):
             got = f"{np.shape(self.mean)}, {np.shape(self.covariance)}"
             raise InputError(None, f"posterior: expected mean ({n},) and covariance ({n}, {n}), got {got}")
+
+    def in_order(self, effects: Sequence[EffectSpec]) -> Posterior:
+        """The same, in the order of these effects, as a model.yaml with them has it. Numbers of one name (a zero that was
+        recalibrated, and one that was found) keep the order among them."""
+        left = list(range(len(self.names)))
+        at = []
+        for name in parameter_names(effects):
+            k = next((k for k in left if self.names[k] == name), None)
+            if k is not None:
+                left.remove(k)
+                at.append(k)
+        return Posterior(tuple(self.names[k] for k in at), np.asarray(self.mean)[at], np.asarray(self.covariance)[np.ix_(at, at)])
 
 
 @dataclass(frozen=True)
@@ -170,18 +186,34 @@ def _posterior(f: Fields | None, model: RobotModel) -> Posterior:
     f.done()
     expected = list(parameter_names(model.effects))
     if names != expected:
-        raise f.error("names", f"expected those of the effects, {', '.join(expected) or 'none'}; where an effect was edited, "
-                               "delete `posterior`, which is of the effects as they were fitted")
+        raise f.error("names", f"expected those of the effects, {', '.join(expected) or 'none'}; {_EDITED}")
     if not isinstance(mean, list) or len(mean) != len(expected):
         raise f.error("mean", f"expected a list of {len(expected)} numbers")
-    square = isinstance(covariance, list) and all(isinstance(row, list) and len(row) == len(expected) for row in covariance)
-    if not square or len(covariance) != len(expected):
-        raise f.error("covariance", f"expected {len(expected)} rows of {len(expected)} numbers")
-    rows = [_numbers(f, "covariance", row) for row in covariance]
-    bad = next((k for k, row in enumerate(rows) if row[k] < 0), None)
-    if bad is not None:
-        raise f.error("covariance", f"expected a variance of {expected[bad]}, got {rows[bad][bad]:g}")
-    return Posterior(tuple(expected), np.array(_numbers(f, "mean", mean)), np.array(rows).reshape(len(expected), len(expected)))
+    means = _numbers(f, "mean", mean)
+    values = [float(v) for e in model.effects for value in e.parameters.values() for v in np.ravel(value)]
+    for name, value, there in zip(expected, values, means):
+        if not math.isclose(value, there, rel_tol=_SAME, abs_tol=_SAME * 1e-3):
+            raise f.error("mean", f"expected {value:g} of {name}, as the effect has it, got {there:g}; {_EDITED}")
+    return Posterior(tuple(expected), np.array(means), _covariance(f, covariance, expected))
+
+
+def _covariance(f: Fields, content: Any, names: Sequence[str]) -> Array:
+    """The covariance (n, n) of these numbers, infinite where nothing is known of them."""
+    n = len(names)
+    if not isinstance(content, list) or len(content) != n or any(not isinstance(row, list) or len(row) != n for row in content):
+        raise f.error("covariance", f"expected {n} rows of {n} numbers")
+    rows = np.array([_numbers(f, "covariance", row) for row in content]).reshape(n, n)
+    for name, variance in zip(names, np.diag(rows)):
+        if variance < 0:
+            raise f.error("covariance", f"expected a variance of {name}, got {variance:g}")
+    finite = np.where(np.isfinite(rows), rows, 0.0)
+    most = float(np.abs(finite).max(initial=0.0))
+    if not np.allclose(rows, rows.T, rtol=_SAME, atol=_SAME * most):
+        raise f.error("covariance", "expected the same numbers across the diagonal")
+    scale = np.sqrt(np.where(np.diag(finite) > 0, np.diag(finite), 1.0))
+    if n and float(np.linalg.eigvalsh(finite / np.outer(scale, scale))[0]) < -_SAME * n:
+        raise f.error("covariance", "expected no negative variance in any direction")
+    return rows
 
 
 def _numbers(f: Fields, key: str, values: Sequence[Any], finite: bool = False) -> list[float]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
-from workbench.physical import SERVO, STRONGEST, doubts
+from workbench.physical import LEAST_KNOWN, SERVO, STRONGEST, doubts
 from workbench.robot.law_covariance import LawCovariance, law_covariance
 from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable, torque_tables
@@ -240,6 +240,9 @@ def _value_and_sd(content: Mapping[Any, Any], path: Path, at: str) -> tuple[Any,
     sd = content["sd"]
     if isinstance(sd, bool) or not isinstance(sd, (int, float)) or not (math.isfinite(sd) and sd >= 0):
         raise InputError(path, f"{at}sd: expected a non-negative number, got {sd!r}")
+    value = content["value"]
+    if isinstance(value, (int, float)) and value and sd > LEAST_KNOWN * abs(value):
+        raise InputError(path, f"{at}sd: expected at most {LEAST_KNOWN:g} times the value, got {sd:g}")
     return content["value"], float(sd)
 
 

@@ -26,6 +26,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from workbench.robot import Ground
+from workbench.robot.model_source import check_own_friction, own_friction
 
 POINT_FOOT, HYDRO_FOOT = "foot_sphere", "foot_hydro"
 """Names by which a model's feet offer a shape for each contact model; a model with one shape only uses it for both."""
@@ -66,13 +67,15 @@ def AddGround(plant: MultibodyPlant, scene_graph: SceneGraph, instance: ModelIns
     """A level floor at z = 0, and the pair friction of feet on it. Call before Finalize.
 
     Where `ground.friction` is None the SDF's own coefficients act: the ground takes the feet's mean, as the pair's
-    friction is the harmonic mean of both.
+    friction is the harmonic mean of both; InputError where one is impossible.
     """
     inspector = scene_graph.model_inspector()
-    live = [g for g in model_geometries(plant, instance) if inspector.GetProximityProperties(g) is not None]
+    live = {g: link for g, link in model_geometries(plant, instance).items() if inspector.GetProximityProperties(g) is not None}
     friction = ground.friction
     if friction is None:
-        given = [_friction(inspector.GetProximityProperties(g)) for g in live]
+        given = [own_friction(inspector.GetProximityProperties(g)) for g in live]
+        for link, value in zip(live.values(), given):
+            check_own_friction(link, value)
         friction = float(np.mean([f for f in given if f is not None])) if any(f is not None for f in given) else 1.0
     else:
         for g in live:
@@ -94,7 +97,7 @@ def SetFootContact(plant: MultibodyPlant, scene_graph: SceneGraph, instance: Mod
     own, in series with the ground's). Call after AddGround, before Finalize."""
     inspector = scene_graph.model_inspector()
     ground = plant.GetCollisionGeometriesForBody(plant.world_body())[-1]
-    mu_ground = _friction(inspector.GetProximityProperties(ground)) or 0.0
+    mu_ground = own_friction(inspector.GetProximityProperties(ground)) or 0.0
     for g, link in model_geometries(plant, instance).items():
         properties = inspector.GetProximityProperties(g)
         if properties is None or (link not in friction and stiffness is None):
@@ -111,12 +114,6 @@ def SetFootContact(plant: MultibodyPlant, scene_graph: SceneGraph, instance: Mod
 def partner_friction(pair: float, ground: float) -> float:
     """What gives the pair, 2ab/(a+b), with the ground's; at most 1e3, where the pair should exceed twice the ground's."""
     return min(pair * ground / (2 * ground - pair), 1e3) if pair < 2 * ground else 1e3
-
-
-def _friction(properties: ProximityProperties) -> float | None:
-    if not properties.HasProperty("material", "coulomb_friction"):
-        return None
-    return float(properties.GetProperty("material", "coulomb_friction").dynamic_friction())
 
 
 def lowest_point(

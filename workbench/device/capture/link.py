@@ -45,10 +45,13 @@ class UdpLink:
     route to the server. InputError where there is no such server or interface."""
 
     def __init__(self, server: str, interface: str | None = None, command_port: int = 1510) -> None:
+        if not server:  # an unset shell variable, which stands for every address
+            raise InputError(None, "server: expected a name or an address, got nothing")
         try:
             self._server = (socket.gethostbyname(server), command_port)
-        except OSError as e:
-            raise InputError(None, f"server '{server}': not a known host ({e.strerror})") from None
+        except (OSError, UnicodeError) as e:  # UnicodeError: a name that no host can have
+            why = getattr(e, "strerror", None) or "too long, or with empty parts"
+            raise InputError(None, f"server '{server[:80]}': not a known host ({why})") from None
         self.chosen = interface is None
         self.interface = interface or _route_to(self._server)
         self._command = _udp()

@@ -8,7 +8,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Recalibrated:
-    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding."""
+    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding. at_end:
+    whether it went to the end of that, so that the servo's own may lie beyond, and findings there stand for the difference."""
 
     number: str
     where: tuple[str, ...]
@@ -16,6 +17,7 @@ class Recalibrated:
     value: float
     sd: float
     unit: str
+    at_end: bool = False
 
     @property
     def sigmas(self) -> float:
@@ -25,4 +27,4 @@ class Recalibrated:
     def to_json(self) -> dict[str, Any]:
         """The entry in findings.json."""
         return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
-                "unit": self.unit}
+                "unit": self.unit} | ({"at_end": True} if self.at_end else {})

@@ -80,7 +80,9 @@ def load_rollout(path: str | Path) -> Take:
     time = columns.get("time")
     if time is None or not joints:
         raise InputError(path, "line 4: expected the columns 'time' and 'position.JOINT'")
-    if not len(time) or out_of_order(time).any():
+    if not len(time):
+        raise InputError(path, "line 5: is missing; expected a row for each frame")
+    if out_of_order(time).any():
         raise InputError(path, "column 'time': expected increasing numbers")
 
     def stack(names: list[str], unit: float = 1.0) -> Array | None:

@@ -32,7 +32,8 @@ class LogChecks:
     if it then leaps by more than `leaps` of its other steps; a joint that sticks sets out slowly. far: largest distance of a goal
     from it at the end [deg]. same: share of rows in which goal and position are equal above which the goal is no command; shift:
     by so many rows at most. pause: between rows, in medians of their steps. longest: longest duration of a log [s]. largest:
-    largest number in any channel, beyond the range of 32-bit counts [SI].
+    largest number in any channel, beyond the range of 32-bit counts [SI]. read: least share of rows with a reading; logs of
+    several rates have one in ten.
     """
 
     slow: float = 0.5
@@ -46,6 +47,7 @@ class LogChecks:
     pause: float = 8.0
     longest: float = 7200.0
     largest: float = 1e10
+    read: float = 0.04
 
 
 CHECKS = LogChecks()
@@ -59,7 +61,7 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     _check_bounds(recording, checks)
     if recording.sensing != "encoders" or np.any(np.diff(time) <= 0):
         return recording
-    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording), *_no_reading(recording)]
+    channels, problems = dict(recording.channels), [*recording.problems, *few_rows(recording), *_no_reading(recording, checks)]
     if len(time) < 3:
         return replace(recording, problems=tuple(problems))
     if np.median(np.diff(time)) < checks.fast:  # what follows compares with the times in which servos answer
@@ -91,10 +93,17 @@ def check_log(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     return as_logged(replace(mended.recording, problems=tuple(problems)))
 
 
-def _no_reading(r: Recording) -> list[str]:
-    """A line for each position without a reading in any row."""
-    read = {name: values for j in r.joints if (values := r.channels.get(name := f"position.{j}")) is not None}
-    return [f"{name}: holds no reading in any row" for name, values in read.items() if not np.isfinite(values).any()]
+def _no_reading(r: Recording, c: LogChecks) -> list[str]:
+    """A line for each position without a reading in any row, or with next to none; one in the first row is that of commands."""
+    out = []
+    for name in (f"position.{joint}" for joint in r.joints if f"position.{joint}" in r.channels):
+        rows = np.flatnonzero(np.isfinite(r.channels[name]))
+        count = len(rows)
+        if not count:
+            out.append(f"{name}: holds no reading in any row")
+        elif rows[-1] and count < c.read * len(r.time):
+            out.append(f"{name}: holds a reading in {count} of {len(r.time)} rows: nothing is compared in the others")
+    return out
 
 
 def _check_bounds(r: Recording, c: LogChecks) -> None:
@@ -147,6 +156,12 @@ def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
 def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
     for joint, goal, position, on in _commanded_joints(r):
         both = np.isfinite(goal) & np.isfinite(position) & on
+        sent = int(np.argmax(np.isfinite(goal))) if np.isfinite(goal).any() else len(goal)
+        unasked = position[:sent][on[:sent] & np.isfinite(position[:sent])]
+        if len(unasked) >= 10 and np.rad2deg(np.ptp(unasked)) > c.goes:
+            when = "in every row" if sent == len(goal) else f"until {r.time[sent]:.3f} s"
+            yield (f"goal.{joint}: blank {when} while the joint, its torque on, moves over "
+                   f"{np.rad2deg(np.ptp(unasked)):.3g} deg: simulated as held; was the command recorded?")
         if both.sum() < 10:
             continue
         far = np.rad2deg(np.ptp(position[both]))

@@ -15,6 +15,7 @@ import numpy as np
 
 from workbench.files import InputError
 from workbench.files.reading import cached_by_content
+from workbench.physical import GROUND
 from workbench.types import Array
 
 
@@ -93,9 +94,10 @@ def _build(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
 
 
 @cached_by_content(maxsize=32)
-def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
+def model_problems(path: Path, source: Path, held: str = "", slides: bool = False) -> tuple[str, ...]:
     """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
-    none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either."""
+    none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either. slides:
+    whether the description's own friction acts on the ground; InputError where that is impossible."""
     plant, scene_graph, instances = _build(path, source)
     if len(instances) != 1:
         return ()
@@ -103,7 +105,8 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
     groups = _fixed_together(plant)
     groups = {name: group for name, group in groups.items() if held not in group}
     feet = () if held else _feet(plant, bodies)
-    return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies, held), *feet)
+    rubs = _rubs(plant, scene_graph, bodies, source) if slides and not held else ()
+    return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies, held), *feet, *rubs)
 
 
 @cached_by_content(maxsize=32)
@@ -209,6 +212,36 @@ def _points(plant: Any, scene_graph: Any, body: Any) -> Array:
             if end.index() == body.index():
                 points.append(on.GetFixedPoseInBodyFrame().translation())
     return np.reshape(points, (-1, 3)).astype(float)
+
+
+def _rubs(plant: Any, scene_graph: Any, bodies: list[Any], source: Path) -> Iterator[str]:
+    """Doubtful friction of links; InputError for an impossible one."""
+    inspector = scene_graph.model_inspector()
+    for body in bodies:
+        for g in plant.GetCollisionGeometriesForBody(body):
+            friction = own_friction(inspector.GetProximityProperties(g))
+            try:
+                check_own_friction(body.name(), friction)
+            except InputError as e:
+                raise InputError(source, e.problem) from None
+            if friction is not None and (doubt := GROUND["friction"].doubt(friction)) is not None:
+                yield f"link '{body.name()}': friction: {doubt}"
+                break
+
+
+def own_friction(properties: Any) -> float | None:
+    """Dynamic friction among a shape's proximity properties, which acts between steps; None where there is none."""
+    if not properties.HasProperty("material", "coulomb_friction"):
+        return None
+    return float(properties.GetProperty("material", "coulomb_friction").dynamic_friction())
+
+
+def check_own_friction(link: str, friction: float | None) -> None:
+    """InputError where the friction that a description gives a link's shape is impossible."""
+    text = None if friction is None else GROUND["friction"].problem(friction)
+    if text is not None:
+        raise InputError(None, f"link '{link}': friction: {text}; correct it, or state the ground's own friction in the session, "
+                               "which replaces it")
 
 
 def _feet(plant: Any, bodies: list[Any]) -> Iterator[str]:

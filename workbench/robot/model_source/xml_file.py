@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 from workbench.files import InputError
 from workbench.files.numerals import number_of
 from workbench.files.reading import read_bytes
+from workbench.physical import GROUND
 
 MOST_XML = 32 << 20
 """Largest description [bytes]; a robot of a hundred links has 0.1 MB."""
@@ -30,6 +31,10 @@ _ATTRIBUTES = {"mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz"
                "mesh": ("scale",), "color": ("rgba",)}
 """URDF's attributes that are numbers."""
 _COUNTS = {"rpy": (3,), "rgba": (4,), "friction": (1,)}
+_MATERIAL = {"mu_static": None, "mu_dynamic": None, "point_contact_stiffness": GROUND["stiffness"],
+             "hunt_crossley_dissipation": GROUND["dissipation"], "hydroelastic_modulus": None, "relaxation_time": None}
+"""Drake's own elements of a shape, each one number, with its range; Drake takes 0 for a text. Of friction the robot is asked, as
+a session may replace it."""
 _LARGEST, _SMALLEST = 1e12, 1e-300
 _ENDLESS = {"lower", "upper", "effort", "velocity"}
 """Those that may be infinite."""
@@ -102,9 +107,22 @@ def check_numbers(path: Path, root: Element) -> None:
         for element in owner.iter():
             if root.tag == "sdf" and element.tag in _NUMBERS and len(element) == 0:
                 _check(path, owner, str(element.tag), element.text or "")
+            if str(element.tag).startswith(f"{{{DRAKE}}}"):
+                text = element.text if root.tag == "sdf" else element.get("value")
+                _check_material(path, owner, str(element.tag).partition("}")[2], text or "")
             for key in _ATTRIBUTES.get(str(element.tag), ()) if root.tag == "robot" else ():
                 if key in element.attrib:
                     _check(path, owner, key if key != "value" else element.tag, element.attrib[key])
+
+
+def _check_material(path: Path, owner: Element, what: str, text: str) -> None:
+    if what not in _MATERIAL:
+        return
+    _check(path, owner, what, text)
+    wanted = _MATERIAL[what]
+    problem = None if wanted is None else wanted.problem(number_of(text.strip()))
+    if problem is not None:
+        raise InputError(path, f"{owner.tag} '{owner.get('name', '')}': {what}: {problem}")
 
 
 def _check(path: Path, owner: Element, what: str, text: str) -> None:

@@ -11,7 +11,7 @@ from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.view.figures.unknown_torque import unknown_torque
 from workbench.view.report.page import Part, Picture, Section, Table, Text
 from workbench.view.report.tables import folded_table
-from workbench.view.report.words import capital, change, join_words, probable, title_of, unbroken
+from workbench.view.report.words import capital, change, join_words, probable, suspect_constants, title_of, unbroken
 
 
 def unknown_torque_section(unknown: UnknownTorque) -> Section:
@@ -53,5 +53,6 @@ def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     rows = [[r.number.replace("_", " "), join_words(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}",
              unbroken(unit), f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
     said = "These constants were adjusted within the tolerances of your servo file; this does not count as a finding."
-    return Section("Recalibrated constants", [Text(said), *folded_table(
+    suspect = [Text(f"{capital(sentence)}.") for sentence in suspect_constants(numbers)]
+    return Section("Recalibrated constants", [Text(said), *suspect, *folded_table(
         ["constant", "where", "nominal", "adjusted", "unit", "standard deviations"], rows, "more constants")])

@@ -11,6 +11,7 @@ from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.results.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.identify.results.reasons import Dependence, Statement
+from workbench.identify.results.recalibrated import Recalibrated
 from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import EffectSpec
 
@@ -239,3 +240,14 @@ def said_aside(provenance: Mapping[str, Any]) -> list[str]:
     """A sentence for each correction of a log, and for each stretch that was excluded from the evidence."""
     aside = provenance.get("set_aside", {})
     return [f"Corrected or excluded in {take}: {line.rstrip('.')}." for take, lines in aside.items() for line in lines]
+
+
+def suspect_constants(numbers: Sequence[Recalibrated]) -> list[str]:
+    """A sentence for each constant of the servo law that was adjusted as far as its tolerance goes, by number and value."""
+    ended: dict[tuple[str, float, float, str], list[str]] = {}
+    for r in numbers:
+        if r.at_end:
+            ended.setdefault((r.number, r.nominal, r.value, r.unit), []).extend(r.where)
+    return [f"{number.replace('_', ' ')} at {join_words(where)}: adjusted from {nominal:.3g} to {value:.3g} {unit}, as far as "
+            "its tolerance goes; findings there may stand for a nominal law that is wrong: correct it in the session's servos "
+            "(0 where the servo has none), or widen its `sd`" for (number, nominal, value, unit), where in ended.items()]
