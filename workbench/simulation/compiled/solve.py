@@ -13,10 +13,12 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import State, Tree, Work
-from workbench.simulation.compiled.contact import along
-from workbench.simulation.compiled.kernel import part
-from workbench.simulation.compiled.tree import copy_paths, factor, solve_factored, times_matrix
-from workbench.simulation.compiled.vectors import clamp
+from workbench.simulation.compiled.contact import along, deepest
+from workbench.simulation.compiled.kernel import part, rare
+from workbench.simulation.compiled.lanes.number import LANES, put_stretch, stretch
+from workbench.simulation.compiled.rows import copy_rows, factor_rows, solve_rows, times_rows
+from workbench.simulation.compiled.tree import factor, solve_factored
+from workbench.simulation.compiled.vectors import Three, clamp
 
 STICTION = 1e-4
 """Slip speed below which a contact sticks [m/s]: MultibodyPlant's default stiction tolerance."""
@@ -41,12 +43,12 @@ def prepare(tree: Tree, state: State, dt: float, count: int, w: Work) -> None:
     """Free motion v*, the constraints there are and their constants, from M, forces and contacts."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
-    copy_paths(tree.path, w.M, w.H)
-    factor(tree.path, w.H)
+    copy_rows(tree, w.M, w.H)
+    factor_rows(tree, w.H, w.pivot)
     for k in range(tree.path.shape[0]):
         w.v_star[k] = w.force[k]
-        w.scale[k] = 1.0 / math.sqrt(w.M[k, k])
-    solve_factored(tree.path, w.H, w.v_star)
+        w.scale[k] = 1.0 / math.sqrt(w.M[k, tree.depth[k]])
+    solve_rows(tree, w.H, w.pivot, w.v_star)
     for k in range(tree.path.shape[0]):
         w.v_star[k] = state.v[k] + dt * w.v_star[k]
     for g in range(w.active.shape[0]):
@@ -65,7 +67,7 @@ def prepare(tree: Tree, state: State, dt: float, count: int, w: Work) -> None:
 @part
 def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work) -> None:
     """Dry friction and limits of one joint."""
-    near_rigid = NEAR_RIGID / w.M[k, k]
+    near_rigid = NEAR_RIGID / w.M[k, tree.depth[k]]
     if tree.brake[i] > 0.0:
         w.brake_gain[i] = tree.brake_gain[i] if 1.0 / (dt * tree.brake_gain[i]) >= near_rigid else 1.0 / (dt * near_rigid)
         w.active[tree.group[k]] = True
@@ -82,16 +84,26 @@ def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work)
 @part
 def _weight(tree: Tree, c: int, w: Work) -> float:
     """Norm over three of J diag(A)^-1 J' of a contact."""
-    path = tree.row if w.other[c] >= 0 else tree.path
-    total = 0.0
-    for r in range(3):
-        for s in range(r + 1):
-            entry = 0.0
-            j = w.last[c]
-            while j >= 0:
-                entry += w.J[c, r, j] * w.J[c, s, j] * w.scale[j] * w.scale[j]
-                j = path[j]
-            total += entry * entry if r == s else 2.0 * entry * entry
+    of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+    xx = xy = yy = xz = yz = zz = 0.0
+    t = int(deepest(tree, c, w))
+    while True:  # there is at least one
+        x, y, z, scale = w.J[c, 0, t], w.J[c, 1, t], w.J[c, 2, t], w.scale[of[t]]
+        xx += x * x * scale * scale
+        xy += y * x * scale * scale
+        yy += y * y * scale * scale
+        xz += z * x * scale * scale
+        yz += z * y * scale * scale
+        zz += z * z * scale * scale
+        if t == 0:
+            break
+        t -= 1
+    total = xx * xx
+    total += 2.0 * xy * xy
+    total += yy * yy
+    total += 2.0 * xz * xz
+    total += 2.0 * yz * yz
+    total += zz * zz
     return math.sqrt(total) / 3.0
 
 
@@ -150,11 +162,9 @@ def _push_contact(tree: Tree, c: int, dt: float, w: Work) -> None:
     w.hessian[c, 1] = -per_speed * x * y * share
     w.hessian[c, 2] = per_speed * (1.0 - y * y * share)
     w.hessian[c, 3] = slope
-    path = tree.row if w.other[c] >= 0 else tree.path
-    j = w.last[c]
-    while j >= 0:
-        w.impulse[j] += w.J[c, 2, j] * normal - per_speed * (w.J[c, 0, j] * x + w.J[c, 1, j] * y)
-        j = path[j]
+    of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+    for t in range(deepest(tree, c, w), -1, -1):
+        w.impulse[of[t]] += w.J[c, 2, t] * normal - per_speed * (w.J[c, 0, t] * x + w.J[c, 1, t] * y)
 
 
 @part
@@ -228,26 +238,27 @@ def _slope(tree: Tree, dt: float, count: int, alpha: float, curve: float, w: Wor
 def _direction(tree: Tree, dt: float, count: int, w: Work) -> float:
     """w.dv = -H^-1 gradient, w.dp = A dv, w.dvc = J dv; returns dv' A dv."""
     o = 6 if tree.free else 0
-    path = tree.row if w.crossed[0] else tree.path
-    copy_paths(path, w.M, w.H)
+    copy_rows(tree, w.M, w.H)
     for i in range(tree.parent.shape[0]):
-        v = w.v_next[o + i]
+        v, t = w.v_next[o + i], tree.depth[o + i]
         if tree.brake[i] > 0.0 and abs(w.brake_gain[i] * v) <= tree.brake[i]:
-            w.H[o + i, o + i] += dt * w.brake_gain[i]
+            w.H[o + i, t] += dt * w.brake_gain[i]
         if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
-            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
+            w.H[o + i, t] += 1.0 / w.limit_R[i]
         if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
-            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
-    for c in range(count):
-        _stiffen(tree, c, w)
-    factor(path, w.H)
+            w.H[o + i, t] += 1.0 / w.limit_R[i]
     for k in range(tree.path.shape[0]):
         w.dv[k] = -w.gradient[k]
-    solve_factored(path, w.H, w.dv)
-    times_matrix(tree.path, w.M, w.dv, w.dp)
+    if w.crossed[0]:
+        _solve_crossed(tree, count, w)
+    else:
+        for c in range(count):
+            _stiffen(tree, c, w)
+        factor_rows(tree, w.H, w.pivot)
+        solve_rows(tree, w.H, w.pivot, w.dv)
+    times_rows(tree, w.M, w.dv, w.dp)
     for c in range(count):
-        for r in range(3):
-            w.dvc[c, r] = along(tree, c, w.J[c, r], w.dv, w)
+        w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2] = along(tree, c, w.dv, w)
     curve = 0.0
     for k in range(tree.path.shape[0]):
         curve += w.dv[k] * w.dp[k]
@@ -257,17 +268,38 @@ def _direction(tree: Tree, dt: float, count: int, w: Work) -> float:
 @part
 def _stiffen(tree: Tree, c: int, w: Work) -> None:
     """H += J' G J of a contact."""
-    path = tree.row if w.other[c] >= 0 else tree.path
-    j = w.last[c]
-    while j >= 0:
-        x = w.hessian[c, 0] * w.J[c, 0, j] + w.hessian[c, 1] * w.J[c, 1, j]
-        y = w.hessian[c, 1] * w.J[c, 0, j] + w.hessian[c, 2] * w.J[c, 1, j]
-        z = w.hessian[c, 3] * w.J[c, 2, j]
-        i = j
-        while i >= 0:
-            w.H[j, i] += x * w.J[c, 0, i] + y * w.J[c, 1, i] + z * w.J[c, 2, i]
-            i = path[i]
-        j = path[j]
+    deep, J = tree.depth[w.last[c]], w.J[c]
+    for u in range(0, deep + 1, LANES):
+        a, b, d = stretch(J, 0, u), stretch(J, 1, u), stretch(J, 2, u)
+        for t in range(u, deep + 1):
+            x, y, z = _stiffness(c, t, w)
+            j = tree.above[w.last[c], t]
+            put_stretch(w.H, j, u, stretch(w.H, j, u) + (x * a + y * b + z * d))
+
+
+@part
+def _stiffness(c: int, t: int, w: Work) -> Three:
+    """G times column t of a contact's Jacobian."""
+    return (w.hessian[c, 0] * w.J[c, 0, t] + w.hessian[c, 1] * w.J[c, 1, t],
+            w.hessian[c, 1] * w.J[c, 0, t] + w.hessian[c, 2] * w.J[c, 1, t], w.hessian[c, 3] * w.J[c, 2, t])
+
+
+@rare
+def _solve_crossed(tree: Tree, count: int, w: Work) -> None:
+    """w.dv := H^-1 w.dv, where a contact lies between two branches; H is without contacts yet."""
+    for j in range(tree.depth.shape[0]):
+        for i in range(j):
+            w.whole[j, i] = 0.0
+        for t in range(tree.depth[j] + 1):
+            w.whole[j, tree.above[j, t]] = w.H[j, t]
+    for c in range(count):
+        of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+        for t in range(deepest(tree, c, w), -1, -1):
+            x, y, z = _stiffness(c, t, w)
+            for u in range(t + 1):
+                w.whole[of[t], of[u]] += x * w.J[c, 0, u] + y * w.J[c, 1, u] + z * w.J[c, 2, u]
+    factor(tree.number, tree.every, w.whole)
+    solve_factored(tree.number, tree.every, w.whole, w.dv)
 
 
 @part
@@ -317,8 +349,8 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
         anything |= w.active[g]
     if not anything:
         return 0
-    times_matrix(tree.path, w.M, w.v_star, w.momentum_star)
-    times_matrix(tree.path, w.M, w.v_next, w.momentum)
+    times_rows(tree, w.M, w.v_star, w.momentum_star)
+    times_rows(tree, w.M, w.v_next, w.momentum)
     cost = _cost_here(tree, dt, count, w)
     stalled = False
     for iteration in range(MOST_ITERATIONS + 1):

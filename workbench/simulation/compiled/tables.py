@@ -165,8 +165,7 @@ class _Reader:
         mass, com, inertia = weigh(links, n)
         stiffness, rest = self._springs()
         tree = Tree(
-            free=self.free, parent=parent, path=path, row=np.arange(-1, len(path) - 1, dtype=np.int64), group=_groups(path), R=R,
-            p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
+            free=self.free, parent=parent, path=path, **ways(path, o), group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
             damping=np.array([j.default_damping() for j in self.turning]),
             stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
@@ -252,6 +251,23 @@ class _Reader:
 
 def _rows(values: list[Array], *shape: int) -> Array:
     return np.ascontiguousarray(np.array(values, dtype=float).reshape(len(values), *shape))
+
+
+def ways(path: Ints, base: int) -> dict[str, Ints]:
+    """`Tree.depth` to `Tree.limbs`. base: velocities of a free base."""
+    n = len(path)
+    on_way: list[list[int]] = []
+    for k, before in enumerate(path):
+        on_way.append([*(on_way[before] if before >= 0 else ()), k])
+    depth = np.array([len(way) - 1 for way in on_way], dtype=np.uint32)
+    above = np.zeros((n, int(depth.max(initial=0)) + 1), dtype=np.uint32)
+    for k, way in enumerate(on_way):
+        above[k, :len(way)] = way
+    number, limbs = np.arange(n, dtype=np.uint32), np.arange(base, n, dtype=np.uint32)
+    inside = path[path >= base]
+    if len(set(inside.tolist())) == len(inside):  # no limb branches
+        limbs = limbs[np.argsort(depth[base:], kind="stable")]
+    return {"depth": depth, "above": above, "number": number, "every": np.tile(number, (n, 1)), "limbs": limbs}
 
 
 def _groups(path: Ints) -> Ints:
