@@ -25,9 +25,9 @@ LINK_CONTACTS = 32
 class Tree(NamedTuple):
     """Kinematics, inertia and joint forces. parent (n,): body that carries each joint. path (nv,): the velocity before
     each on the way to the root, -1 at its end. depth (nv,): how many those are; above (nv, d): they and the velocity itself, the
-    root's first, zeros behind. number (nv,), every (nv, nv): the same if all velocities before one were on its way. limbs: the
-    velocities beyond a free base's in an order in which each comes after those on its way; neighbours on different limbs where
-    limbs do not branch. group (nv,): the tree of Drake's forest that a velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
+    root's first, zeros behind. number (nv,), every (nv, nv): the same if all velocities before one were on its way. order: those
+    beyond a free base's by depth. forks (nv,): whether branches begin at or beyond a velocity; a base's count as such. limbs: the
+    others by depth; inner (nv,): how many forks are on the way; joined: forks beyond the base, and velocities beyond such. group (nv,): the tree of Drake's forest that a velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
     inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
     stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while
     it holds. gravity, pull (3,): the latter on the base's origin."""
@@ -39,7 +39,11 @@ class Tree(NamedTuple):
     above: Ints
     number: Ints
     every: Ints
+    order: Ints
+    forks: NDArray[np.bool_]
     limbs: Ints
+    inner: Ints
+    joined: Ints
     group: Ints
     R: Array
     p: Array

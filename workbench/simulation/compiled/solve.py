@@ -303,16 +303,18 @@ def _solve_crossed(tree: Tree, count: int, w: Work) -> None:
 
 
 @part
-def _step_length(tree: Tree, dt: float, count: int, curve: float, w: Work) -> float:
+def _step_length(tree: Tree, dt: float, count: int, curve: float, cost: float, w: Work) -> float:
     """Where the cost is least along dv: Newton on its slope, by halves where that is slow (as rtsafe, Press et al. 2007,
-    section 9.4)."""
+    section 9.4). cost: where it begins."""
     falls = 0.0
     for k in range(tree.path.shape[0]):
         falls -= w.gradient[k] * w.dv[k]
     slope, curvature = _slope(tree, dt, count, LONGEST_STEP, curve, w)
     if slope <= 0.0:
         return LONGEST_STEP
-    if falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, dt, count, LONGEST_STEP, w):
+    most = abs(cost) + LONGEST_STEP * slope  # of the cost at the longest step, which is convex
+    if (falls < 2.0 * (COST_ABSOLUTE + COST_RELATIVE * most)
+            and falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, dt, count, LONGEST_STEP, w)):
         return 1.0
     if slope / falls < LINE_TOLERANCE:
         return LONGEST_STEP
@@ -360,7 +362,7 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
         if iteration == MOST_ITERATIONS or not residual < math.inf:
             break
         curve = _direction(tree, dt, count, w)
-        alpha = _step_length(tree, dt, count, curve, w)
+        alpha = _step_length(tree, dt, count, curve, cost, w)
         for k in range(tree.path.shape[0]):
             w.v_next[k] += alpha * w.dv[k]
             w.momentum[k] += alpha * w.dp[k]

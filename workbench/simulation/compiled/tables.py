@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, GeometryId, SceneGraphInspector, Shape, Sphere
@@ -253,8 +254,8 @@ def _rows(values: list[Array], *shape: int) -> Array:
     return np.ascontiguousarray(np.array(values, dtype=float).reshape(len(values), *shape))
 
 
-def ways(path: Ints, base: int) -> dict[str, Ints]:
-    """`Tree.depth` to `Tree.limbs`. base: velocities of a free base."""
+def ways(path: Ints, base: int) -> dict[str, Any]:
+    """`Tree.depth` to `Tree.joined`. base: velocities of a free base."""
     n = len(path)
     on_way: list[list[int]] = []
     for k, before in enumerate(path):
@@ -263,11 +264,15 @@ def ways(path: Ints, base: int) -> dict[str, Ints]:
     above = np.zeros((n, int(depth.max(initial=0)) + 1), dtype=np.uint32)
     for k, way in enumerate(on_way):
         above[k, :len(way)] = way
-    number, limbs = np.arange(n, dtype=np.uint32), np.arange(base, n, dtype=np.uint32)
-    inside = path[path >= base]
-    if len(set(inside.tolist())) == len(inside):  # no limb branches
-        limbs = limbs[np.argsort(depth[base:], kind="stable")]
-    return {"depth": depth, "above": above, "number": number, "every": np.tile(number, (n, 1)), "limbs": limbs}
+    number = np.arange(n, dtype=np.uint32)
+    ends = np.bincount(path[path >= 0], minlength=n) == 0
+    forks = {j for j in range(n) if sum(j in way for way, end in zip(on_way, ends) if end) > 1} | set(range(base))
+    inner = np.array([sum(j in forks for j in way[:-1]) for way in on_way], dtype=np.uint32)
+    order = base + np.argsort(depth[base:], kind="stable").astype(np.uint32)
+    return {"depth": depth, "above": above, "number": number, "every": np.tile(number, (n, 1)), "inner": inner, "order": order,
+            "forks": np.array([k in forks for k in range(n)]),
+            "limbs": np.array([k for k in order if int(k) not in forks], dtype=np.uint32),
+            "joined": np.array([k for k in range(base, n) if inner[k] > base or k in forks], dtype=np.uint32)}
 
 
 def _groups(path: Ints) -> Ints:
