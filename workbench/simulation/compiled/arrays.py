@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from workbench.types import Array
 
 Ints = NDArray[np.int64]
+Numbers = NDArray[np.uint32]
+"""Of velocities, bodies and columns. As they cannot be negative, numba leaves out the test of each index for counting from the end,
+which took as long as the arithmetic of many loops."""
 
 
 BOX, CYLINDER, OTHER = 0, 1, 2
@@ -23,7 +26,7 @@ LINK_CONTACTS = 32
 
 
 class Tree(NamedTuple):
-    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint. path (nv,): the velocity before
+    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint, -1 for the root; carrier (n,): the same, n for the root. path (nv,): the velocity before
     each on the way to the root, -1 at its end. depth (nv,): how many those are; above (nv, d): they and the velocity itself, the
     root's first, zeros behind. number (nv,), every (nv, nv): the same if all velocities before one were on its way. order: those
     beyond a free base's by depth. forks (nv,): whether branches begin at or beyond a velocity; a base's count as such. limbs: the
@@ -34,17 +37,18 @@ class Tree(NamedTuple):
 
     free: bool
     parent: Ints
+    carrier: Numbers
     path: Ints
-    depth: Ints
-    above: Ints
-    number: Ints
-    every: Ints
-    order: Ints
+    depth: Numbers
+    above: Numbers
+    number: Numbers
+    every: Numbers
+    order: Numbers
     forks: NDArray[np.bool_]
-    limbs: Ints
-    inner: Ints
-    joined: Ints
-    group: Ints
+    limbs: Numbers
+    inner: Numbers
+    joined: Numbers
+    group: Numbers
     R: Array
     p: Array
     axis: Array
@@ -74,7 +78,7 @@ class Servos(NamedTuple):
     of the law. table_servo, table_of (t,): the servo of each torque table, and its argument (`workbench.servo.tabled`);
     table_at, table_torque (t, K): its knots and torques."""
 
-    joint: Ints
+    joint: Numbers
     zero: Array
     gain: Array
     margin: Array
@@ -116,7 +120,7 @@ class Shapes(NamedTuple):
     other. may_touch (s, s). pair (s, s): row in `pairs` of a sphere (first) and its partner in a contact that is known, -1
     of others; pairs (k, 4): stiffness, dissipation, friction, and where between the other (0) and the sphere (1) the point is."""
 
-    body: Ints
+    body: Numbers
     p: Array
     R: Array
     half: Array
@@ -127,10 +131,10 @@ class Shapes(NamedTuple):
     dissipation: Array
     friction: Array
     depth: Array
-    bodies: Ints
+    bodies: Numbers
     middle: Array
     reach: Array
-    near: Ints
+    near: Numbers
     may_touch: NDArray[np.bool_]
     pair: Ints
     pairs: Array

@@ -26,7 +26,7 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
-from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
+from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Numbers, Tree
 from workbench.simulation.contact import SelectFeet
 
 _VISUAL = re.compile(r"<visual\b[^>]*/>|<visual\b[^>]*>.*?</visual>", re.DOTALL)
@@ -166,7 +166,7 @@ class _Reader:
         mass, com, inertia = weigh(links, n)
         stiffness, rest = self._springs()
         tree = Tree(
-            free=self.free, parent=parent, path=path, **ways(path, o), group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
+            free=self.free, parent=parent, carrier=np.where(parent >= 0, parent, n).astype(np.uint32), path=path, **ways(path, o), group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
             damping=np.array([j.default_damping() for j in self.turning]),
             stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
@@ -275,9 +275,9 @@ def ways(path: Ints, base: int) -> dict[str, Any]:
             "joined": np.array([k for k in range(base, n) if inner[k] > base or k in forks], dtype=np.uint32)}
 
 
-def _groups(path: Ints) -> Ints:
+def _groups(path: Ints) -> Numbers:
     """Trees of Drake's forest: velocities with a common end of their paths."""
-    group = np.empty(len(path), np.int64)
+    group = np.empty(len(path), np.uint32)
     trees = 0
     for k, before in enumerate(path):
         group[k] = trees if before < 0 else group[before]

@@ -26,7 +26,7 @@ def place_bodies(tree: Tree, state: State, w: Work) -> None:
     for r in range(3):
         w.p[n, r] = 0.0
     for i in range(n):
-        a = tree.parent[i] if tree.parent[i] >= 0 else n
+        a = tree.carrier[i]
         _place_body(tree, i, a, math.cos(state.q[i]), math.sin(state.q[i]), w)
 
 
@@ -66,7 +66,7 @@ def move_bodies(tree: Tree, state: State, w: Work) -> None:
         w.A[n, 4] -= y
         w.A[n, 5] -= z
     for i in range(n):
-        a = tree.parent[i] if tree.parent[i] >= 0 else n
+        a = tree.carrier[i]
         _move_body(tree, i, a, o + i, state.v[o + i], w)
 
 
@@ -142,9 +142,10 @@ def gather(tree: Tree, state: State, dt: float, w: Work) -> None:
     gravity, and joints' damping and springs, to w.force."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
-    for i in range(n - 1, -1, -1):
+    i = n
+    while i > 0:
+        i -= 1
         k = o + i
-        a = tree.parent[i]
         bias = 0.0
         for j in range(6):
             bias += w.S[k, j] * w.F[i, j]
@@ -155,10 +156,8 @@ def gather(tree: Tree, state: State, dt: float, w: Work) -> None:
             j = tree.above[k, t]
             w.M[k, t] = (w.S[j, 0] * f0 + w.S[j, 1] * f1 + w.S[j, 2] * f2 + w.S[j, 3] * f3 + w.S[j, 4] * f4 + w.S[j, 5] * f5)
         w.M[k, tree.depth[k]] += tree.armature[i] + dt * tree.damping[i]
-        if a < 0:
-            a = n
-        if a < n or tree.free:
-            _add_body(i, a, w)
+        if tree.carrier[i] < n or tree.free:
+            _add_body(i, tree.carrier[i], w)
     if tree.free:
         _gather_base(tree, n, w)
 

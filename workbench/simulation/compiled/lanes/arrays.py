@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.simulation.compiled.arrays import Ints, Servos, State, Tree
+from workbench.simulation.compiled.arrays import Numbers, Servos, State, Tree
 from workbench.simulation.compiled.lanes.number import LANES
 from workbench.types import Array
 
@@ -17,7 +17,7 @@ from workbench.types import Array
 class LaneServos(NamedTuple):
     """As `Servos`. terms, varies: in any lane; lags: whether any goal does. Of those a lane lacks, a number changes nothing."""
 
-    joint: Ints
+    joint: Numbers
     terms: bool
     varies: bool
     lags: bool

@@ -19,7 +19,7 @@ from workbench.types import Array
 @part
 def _wide_tree(t: Tree) -> Tree:
     return Tree(
-        False, t.parent, t.path, t.depth, t.above, t.number, t.every, t.order, t.forks, t.limbs, t.inner, t.joined,
+        False, t.parent, t.carrier, t.path, t.depth, t.above, t.number, t.every, t.order, t.forks, t.limbs, t.inner, t.joined,
         t.group, as_wide(t.R), as_wide(t.p), as_wide(t.axis),
         as_wide(t.mass), as_wide(t.com), as_wide(t.inertia), as_wide(t.armature), as_wide(t.damping), as_wide(t.stiffness), as_wide(t.rest), as_wide(t.lower),
         as_wide(t.upper), as_wide(t.brake), as_wide(t.brake_gain), as_wide(t.gravity), t.pull)
