@@ -16,8 +16,8 @@ from workbench.types import Array
 
 Ints = NDArray[np.int64]
 Numbers = NDArray[np.uint32]
-"""Of velocities, bodies and columns. As they cannot be negative, numba leaves out the test of each index for counting from the end,
-which took as long as the arithmetic of many loops."""
+"""Of velocities, bodies and columns. They have no sign, so that numba leaves out a test of each index for counting from the end;
+in short loops that took as long as the arithmetic."""
 
 
 BOX, CYLINDER, OTHER = 0, 1, 2
@@ -26,12 +26,14 @@ LINK_CONTACTS = 32
 
 
 class Tree(NamedTuple):
-    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint, -1 for the root; carrier (n,): the same, n for the root. path (nv,): the velocity before
-    each on the way to the root, -1 at its end. depth (nv,): how many those are; above (nv, d): they and the velocity itself, the
-    root's first, zeros behind. number (nv,), every (nv, nv): the same if all velocities before one were on its way. order: those
-    beyond a free base's by depth. forks (nv,): whether branches begin at or beyond a velocity; a base's count as such. limbs: the
-    others by depth; inner (nv,): how many forks are on the way; joined: forks beyond the base, and velocities beyond such. group (nv,): the tree of Drake's forest that a velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
-    inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
+    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint, -1 for the root; carrier (n,): the same, n
+    for the root. path (nv,): the velocity before each on the way to the root, -1 at its end; depth (nv,): how many are on that
+    way; above (nv, d): they and the velocity itself, the root's first, zeros behind. number (nv,), every (nv, nv): the same as
+    depth and above if all velocities before one were on its way. order: velocities beyond a free base's by depth. forks (nv,):
+    whether limbs part at a velocity or beyond it; a base's count as such. limbs: those that are none, by depth. inner (nv,): how
+    many forks are on the way. joined: forks beyond the base and velocities beyond such. group (nv,): the tree of Drake's forest
+    that a velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3)
+    and inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
     stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while
     it holds. gravity, pull (3,): the latter on the base's origin."""
 
@@ -195,10 +197,11 @@ class Log(NamedTuple):
 class Work(NamedTuple):
     """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational.
 
-    M and H have row k's entries in the columns of `Tree.above[k]`, the Jacobian J (c, 3, ..) those of contact c in the columns of
-    `Tree.above[last[c]]`, the last velocity that moves it; or of `Tree.every` where its links are on two branches: then other[c]
-    is the other's last, else -1. Columns behind them hold anything. crossed (1,): whether any has such links; pivot (nv,): the diagonal
-    of H's factor; whole (nv, nv): H where links are crossed. shape[c]: of a contact on the floor, or -1 between links. frame (3, 3): axes of the contact that is being found, in rows."""
+    M and H have row k's entries in the columns of `Tree.above[k]`; the Jacobian J (c, 3, ..) of contact c has its own in those
+    of `Tree.above[last[c]]`, the last velocity that moves it, or of `Tree.every` where its links are on two branches: then other[c]
+    is the other's last, else -1. Columns behind them hold anything. pivot (nv,): the diagonal of H's factor. crossed (1,): whether
+    any contact has links on two branches; whole (nv, nv): H then. shape[c]: of a contact on the floor, or -1 between links. frame
+    (3, 3): axes of the contact that is being found, in rows."""
 
     R: Array
     p: Array
@@ -250,7 +253,7 @@ class Work(NamedTuple):
 
 
 ROW = 8
-"""Rows of matrices are as many numbers long as a multiple of this, and begin where processors load so many at once."""
+"""Rows of matrices are a multiple of this long, and begin where processors load so many numbers at once."""
 
 
 def _rows(count: int, width: int) -> Array:
@@ -268,11 +271,11 @@ def work_for(tree: Tree, servos: Servos, shapes: Shapes) -> Work:
     return Work(
         R=zeros((n + 1, 3, 3)), p=zeros((n + 1, 3)), S=zeros((nv, 6)), mass=zeros(n + 1), moment=zeros((n + 1, 3)),
         inertia=zeros((n + 1, 6)), V=zeros((n + 1, 6)), A=zeros((n + 1, 6)), F=zeros((n + 1, 6)), M=_rows(nv, depth),
-        H=_rows(nv, depth), pivot=zeros(nv), whole=zeros((nv, nv)), force=zeros(nv), v_star=zeros(nv), v_next=zeros(nv), momentum=zeros(nv), momentum_star=zeros(nv),
-        gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv), dp=zeros(nv),
-        active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
+        H=_rows(nv, depth), pivot=zeros(nv), whole=zeros((nv, nv)), force=zeros(nv), v_star=zeros(nv), v_next=zeros(nv),
+        momentum=zeros(nv), momentum_star=zeros(nv), gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv),
+        dp=zeros(nv), active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
         limit_on=zeros((n, 2), dtype=np.bool_), limit_v=zeros((n, 2)), limit_R=zeros(n), push=zeros(m), motor=zeros(m),
         relief=zeros(m), shape=zeros(c, dtype=np.int64), last=zeros(c, dtype=np.int64), other=zeros(c, dtype=np.int64),
-        crossed=zeros(1, dtype=np.bool_), stiffness=zeros(c), dissipation=zeros(c), friction=zeros(c), J=_rows(3 * c, nv).reshape(c, 3, -1),
-        elastic=zeros(c), normal=zeros(c), soft=zeros(c), vc=zeros((c, 3)), dvc=zeros((c, 3)), hessian=zeros((c, 4)),
-        turned=zeros(4), frame=zeros((3, 3)))
+        crossed=zeros(1, dtype=np.bool_), stiffness=zeros(c), dissipation=zeros(c), friction=zeros(c),
+        J=_rows(3 * c, nv).reshape(c, 3, -1), elastic=zeros(c), normal=zeros(c), soft=zeros(c), vc=zeros((c, 3)),
+        dvc=zeros((c, 3)), hessian=zeros((c, 4)), turned=zeros(4), frame=zeros((3, 3)))

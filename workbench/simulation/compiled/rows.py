@@ -1,8 +1,8 @@
 """The algebra of `tree` for one robot, several entries of a row at once.
 
-A velocity and one on its way to the root have the same velocities above them in the same columns, so that rows are subtracted from
-each other whole. Each number is computed by the operations of `tree` in their order: results are the same to the last bit. Rows of
-limbs depend on each other only where they join: in turns, the processor need not wait for the roots and quotients of one.
+A velocity and one on its way to the root have the same velocities above them in the same columns, so that rows are subtracted
+from each other whole. Each number is computed by the operations of `tree` in their order: results are the same to the last bit.
+Rows of limbs depend on each other only where they join: in turns, the processor need not wait for the roots and quotients of one.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 
 from workbench.simulation.compiled.arrays import Array, Tree
 from workbench.simulation.compiled.kernel import part
-from workbench.simulation.compiled.lanes.number import LANES, Wide, lane, put_stretch, stretch
+from workbench.simulation.compiled.number import LANES, Wide, lane, put_stretch, stretch
 
 
 @part
@@ -27,13 +27,13 @@ def factor_rows(tree: Tree, H: Array, pivot: Array) -> None:
     """H = L' L in place, but for the diagonal of L, which goes to pivot (nv,): a processor waits long for a row of which a single
     entry has just been written."""
     base = 6 if tree.free else 0
-    s = tree.limbs.shape[0]
+    s = len(tree.limbs)
     while s > 0:
         s -= 1
         k = tree.limbs[s]
         _scale(H, pivot, k, tree.depth[k])
         _subtract(tree, H, k, tree.inner[k], tree.depth[k])
-    s = tree.joined.shape[0]
+    s = len(tree.joined)
     while s > 0:
         s -= 1
         k = tree.joined[s]
@@ -68,7 +68,7 @@ def _factor_base(H: Array, pivot: Array) -> None:
     """Subtracts all other rows, which are finished, from the base's six, and finishes those, in registers."""
     a, b, c = stretch(H, 0, 0), stretch(H, 1, 0), stretch(H, 2, 0)
     d, e, f = stretch(H, 3, 0), stretch(H, 4, 0), stretch(H, 5, 0)
-    k = H.shape[0]
+    k = len(H)
     while k > 6:
         k -= 1
         row = stretch(H, k, 0)
@@ -114,7 +114,7 @@ def _finish(H: Array, pivot: Array, k: int, row: Wide) -> Wide:
 def solve_rows(tree: Tree, H: Array, pivot: Array, x: Array) -> None:
     """x := (L' L)^-1 x."""
     base = 6 if tree.free else 0
-    s = tree.limbs.shape[0]
+    s = len(tree.limbs)
     while s > 0:
         s -= 1
         k = tree.limbs[s]
@@ -122,7 +122,7 @@ def solve_rows(tree: Tree, H: Array, pivot: Array, x: Array) -> None:
         x[k] = v
         for t in range(tree.inner[k], tree.depth[k]):
             x[tree.above[k, t]] -= H[k, t] * v
-    s = tree.joined.shape[0]
+    s = len(tree.joined)
     while s > 0:
         s -= 1
         k = tree.joined[s]
@@ -156,7 +156,7 @@ def solve_rows(tree: Tree, H: Array, pivot: Array, x: Array) -> None:
 @part
 def _solve_base(H: Array, pivot: Array, x: Array) -> None:
     a, b, c, d, e, f = x[0], x[1], x[2], x[3], x[4], x[5]
-    i = x.shape[0]
+    i = len(x)
     while i > 6:
         i -= 1
         v = x[i]

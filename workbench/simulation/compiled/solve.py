@@ -14,8 +14,17 @@ import math
 
 from workbench.simulation.compiled.arrays import State, Tree, Work
 from workbench.simulation.compiled.contact import along, deepest
+from workbench.simulation.compiled.cost import (
+    COST_ABSOLUTE,
+    COST_RELATIVE,
+    MOST_ITERATIONS,
+    cost_along,
+    limit_impulse,
+    normal_impulse,
+    step_length,
+)
 from workbench.simulation.compiled.kernel import part, rare
-from workbench.simulation.compiled.lanes.number import LANES, put_stretch, stretch
+from workbench.simulation.compiled.number import LANES, put_stretch, stretch
 from workbench.simulation.compiled.rows import copy_rows, factor_rows, solve_rows, times_rows
 from workbench.simulation.compiled.tree import factor, solve_factored
 from workbench.simulation.compiled.vectors import Three, clamp
@@ -32,10 +41,6 @@ LIMIT_WINDOW = 2.0
 """Limits farther away than this many steps' travel are left out."""
 RELATIVE, ABSOLUTE = 1e-6, 1e-14
 """Of the momentum's balance, as shares of momentum and in sqrt(J)."""
-COST_RELATIVE, COST_ABSOLUTE = 1e-15, 1e-30
-MOST_ITERATIONS = 100
-LONGEST_STEP = 1.5
-LINE_TOLERANCE = 1e-8
 
 
 @part
@@ -108,21 +113,6 @@ def _weight(tree: Tree, c: int, w: Work) -> float:
 
 
 @part
-def _limit_impulse(w: Work, i: int, side: int, v: float) -> float:
-    """Of one end of a joint that comes towards it at -v, not negative."""
-    return max((w.limit_v[i, side] - v) / w.limit_R[i], 0.0)
-
-
-@part
-def _normal_impulse(w: Work, c: int, v: float, dt: float) -> tuple[float, float]:
-    """Impulse of a contact at normal velocity v, and minus its slope (Hunt-Crossley, implicit)."""
-    force, damping = w.elastic[c] - dt * w.stiffness[c] * v, 1.0 - w.dissipation[c] * v
-    if force <= 0.0 or damping <= 0.0:
-        return 0.0, 0.0
-    return dt * force * damping, dt * (w.stiffness[c] * dt * damping + w.dissipation[c] * force)
-
-
-@part
 def _gradient(tree: Tree, dt: float, count: int, w: Work) -> tuple[float, float]:
     """w.gradient = A (v - v*) - J' impulses, w.impulse = J' impulses, w.hessian of contacts (xx, xy, yy, zz); returns the
     residual and the scale of momentum."""
@@ -134,9 +124,9 @@ def _gradient(tree: Tree, dt: float, count: int, w: Work) -> tuple[float, float]
         if tree.brake[i] > 0.0:
             w.impulse[o + i] += dt * clamp(-w.brake_gain[i] * v, -tree.brake[i], tree.brake[i])
         if w.limit_on[i, 0]:
-            w.impulse[o + i] += _limit_impulse(w, i, 0, v)
+            w.impulse[o + i] += limit_impulse(w, i, 0, v)
         if w.limit_on[i, 1]:
-            w.impulse[o + i] -= _limit_impulse(w, i, 1, -v)
+            w.impulse[o + i] -= limit_impulse(w, i, 1, -v)
     for c in range(count):
         _push_contact(tree, c, dt, w)
     residual = momentum = impulse = 0.0
@@ -157,7 +147,7 @@ def _push_contact(tree: Tree, c: int, dt: float, w: Work) -> None:
     x, y = w.vc[c, 0], w.vc[c, 1]
     per_speed = w.friction[c] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
     share = 1.0 / (x * x + y * y + w.soft[c] * w.soft[c])
-    normal, slope = _normal_impulse(w, c, w.vc[c, 2], dt)
+    normal, slope = normal_impulse(w, c, w.vc[c, 2], dt)
     w.hessian[c, 0] = per_speed * (1.0 - x * x * share)
     w.hessian[c, 1] = -per_speed * x * y * share
     w.hessian[c, 2] = per_speed * (1.0 - y * y * share)
@@ -165,73 +155,6 @@ def _push_contact(tree: Tree, c: int, dt: float, w: Work) -> None:
     of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
     for t in range(deepest(tree, c, w), -1, -1):
         w.impulse[of[t]] += w.J[c, 2, t] * normal - per_speed * (w.J[c, 0, t] * x + w.J[c, 1, t] * y)
-
-
-@part
-def _cost(tree: Tree, dt: float, count: int, alpha: float, w: Work) -> float:
-    """The cost at v + alpha dv."""
-    o = 6 if tree.free else 0
-    cost = 0.0
-    for k in range(tree.path.shape[0]):
-        if w.active[tree.group[k]]:
-            gain = w.momentum[k] - w.momentum_star[k] + alpha * w.dp[k]
-            cost += 0.5 * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k]) * gain
-    for i in range(tree.parent.shape[0]):
-        v = w.v_next[o + i] + alpha * w.dv[o + i]
-        if tree.brake[i] > 0.0:
-            y = abs(w.brake_gain[i] * v)
-            cost += dt / w.brake_gain[i] * (0.5 * y * y if y < tree.brake[i] else tree.brake[i] * (y - 0.5 * tree.brake[i]))
-        if w.limit_on[i, 0]:
-            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 0, v) ** 2
-        if w.limit_on[i, 1]:
-            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 1, -v) ** 2
-    for c in range(count):
-        cost += _contact_cost(c, dt, alpha, w)
-    return cost
-
-
-@part
-def _contact_cost(c: int, dt: float, alpha: float, w: Work) -> float:
-    """Antiderivatives of the impulses: of the normal's, constant from where it has ended, and of lagged friction's."""
-    k, d, elastic = w.stiffness[c], w.dissipation[c], w.elastic[c]
-    x, y, z = w.vc[c, 0] + alpha * w.dvc[c, 0], w.vc[c, 1] + alpha * w.dvc[c, 1], w.vc[c, 2] + alpha * w.dvc[c, 2]
-    z = min(z, elastic / dt / (k + 1e-20), 1.0 / (d + 1e-20))
-    change = -dt * k * z
-    normal = dt * (z * (elastic + 0.5 * change) - 0.5 * d * z * z * (elastic + 2.0 / 3.0 * change))
-    slip = math.sqrt(x * x + y * y + w.soft[c] * w.soft[c]) - w.soft[c]
-    return w.friction[c] * w.normal[c] * slip - normal
-
-
-@part
-def _slope(tree: Tree, dt: float, count: int, alpha: float, curve: float, w: Work) -> tuple[float, float]:
-    """First and second derivative of the cost along dv. curve: dv' A dv."""
-    o = 6 if tree.free else 0
-    first, second = 0.0, curve
-    for k in range(tree.path.shape[0]):
-        first += w.dp[k] * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k])
-    for i in range(tree.parent.shape[0]):
-        dv = w.dv[o + i]
-        v = w.v_next[o + i] + alpha * dv
-        if tree.brake[i] > 0.0:
-            y = -w.brake_gain[i] * v
-            if abs(y) <= tree.brake[i]:
-                second += dt * w.brake_gain[i] * dv * dv
-            first -= dt * clamp(y, -tree.brake[i], tree.brake[i]) * dv
-        if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
-            first -= _limit_impulse(w, i, 0, v) * dv
-            second += dv * dv / w.limit_R[i]
-        if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
-            first += _limit_impulse(w, i, 1, -v) * dv
-            second += dv * dv / w.limit_R[i]
-    for c in range(count):
-        a, b, e = w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2]
-        x, y = w.vc[c, 0] + alpha * a, w.vc[c, 1] + alpha * b
-        size = x * x + y * y + w.soft[c] * w.soft[c]
-        per_speed = w.friction[c] * w.normal[c] / math.sqrt(size)
-        normal, slope = _normal_impulse(w, c, w.vc[c, 2] + alpha * e, dt)
-        first += per_speed * (x * a + y * b) - normal * e
-        second += per_speed * (a * a + b * b - (x * a + y * b) ** 2 / size) + slope * e * e
-    return first, second
 
 
 @part
@@ -303,47 +226,6 @@ def _solve_crossed(tree: Tree, count: int, w: Work) -> None:
 
 
 @part
-def _step_length(tree: Tree, dt: float, count: int, curve: float, cost: float, w: Work) -> float:
-    """Where the cost is least along dv: Newton on its slope, by halves where that is slow (as rtsafe, Press et al. 2007,
-    section 9.4). cost: where it begins."""
-    falls = 0.0
-    for k in range(tree.path.shape[0]):
-        falls -= w.gradient[k] * w.dv[k]
-    slope, curvature = _slope(tree, dt, count, LONGEST_STEP, curve, w)
-    if slope <= 0.0:
-        return LONGEST_STEP
-    most = abs(cost) + LONGEST_STEP * slope  # of the cost at the longest step, which is convex
-    if (falls < 2.0 * (COST_ABSOLUTE + COST_RELATIVE * most)
-            and falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, dt, count, LONGEST_STEP, w)):
-        return 1.0
-    if slope / falls < LINE_TOLERANCE:
-        return LONGEST_STEP
-    guess = min(falls / curvature, LONGEST_STEP)
-    low, high, at = 0.0, LONGEST_STEP, guess
-    change = before = low - high
-    for _ in range(MOST_ITERATIONS):
-        slope, curvature = _slope(tree, dt, count, at, curve, w)
-        slope, curvature = slope / falls, curvature / falls
-        if slope < 0.0:
-            low = at
-        else:
-            high = at
-        if abs(slope) < LINE_TOLERANCE:
-            return at
-        slow = 2.0 * abs(slope) > abs(before * curvature)
-        before = change
-        change = slope / curvature
-        if slow or not low <= at - change <= high:
-            change = 0.5 * (low - high)
-            at = low - change
-        else:
-            at -= change
-        if abs(change) < LINE_TOLERANCE * guess:
-            return at
-    return at
-
-
-@part
 def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
     """From w.v_next, the guess, to the velocities at the step's end; returns how many iterations it took, -1 if it failed."""
     anything = False
@@ -362,7 +244,7 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
         if iteration == MOST_ITERATIONS or not residual < math.inf:
             break
         curve = _direction(tree, dt, count, w)
-        alpha = _step_length(tree, dt, count, curve, cost, w)
+        alpha = step_length(tree, dt, count, curve, cost, w)
         for k in range(tree.path.shape[0]):
             w.v_next[k] += alpha * w.dv[k]
             w.momentum[k] += alpha * w.dp[k]
@@ -377,4 +259,4 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
 
 @part
 def _cost_here(tree: Tree, dt: float, count: int, w: Work) -> float:
-    return _cost(tree, dt, count, 0.0, w)
+    return cost_along(tree, dt, count, 0.0, w)

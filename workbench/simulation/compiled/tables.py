@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, GeometryId, SceneGraphInspector, Shape, Sphere
@@ -26,7 +25,8 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
-from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Numbers, Tree
+from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
+from workbench.simulation.compiled.forest import groups, ways
 from workbench.simulation.contact import SelectFeet
 
 _VISUAL = re.compile(r"<visual\b[^>]*/>|<visual\b[^>]*>.*?</visual>", re.DOTALL)
@@ -166,9 +166,10 @@ class _Reader:
         mass, com, inertia = weigh(links, n)
         stiffness, rest = self._springs()
         tree = Tree(
-            free=self.free, parent=parent, carrier=np.where(parent >= 0, parent, n).astype(np.uint32), path=path, **ways(path, o), group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
-            damping=np.array([j.default_damping() for j in self.turning]),
-            stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
+            free=self.free, parent=parent, carrier=np.where(parent >= 0, parent, n).astype(np.uint32), path=path, **ways(path, o),
+            group=groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
+            damping=np.array([j.default_damping() for j in self.turning]), stiffness=stiffness, rest=rest,
+            lower=np.array([j.position_lower_limit() for j in self.turning]),
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
             gravity=np.zeros(3), pull=np.zeros(3))
         return Tables(joints=tuple(j.name() for j in self.turning), tree=tree, X_WBase=self._X_WBase(),
@@ -252,37 +253,6 @@ class _Reader:
 
 def _rows(values: list[Array], *shape: int) -> Array:
     return np.ascontiguousarray(np.array(values, dtype=float).reshape(len(values), *shape))
-
-
-def ways(path: Ints, base: int) -> dict[str, Any]:
-    """`Tree.depth` to `Tree.joined`. base: velocities of a free base."""
-    n = len(path)
-    on_way: list[list[int]] = []
-    for k, before in enumerate(path):
-        on_way.append([*(on_way[before] if before >= 0 else ()), k])
-    depth = np.array([len(way) - 1 for way in on_way], dtype=np.uint32)
-    above = np.zeros((n, int(depth.max(initial=0)) + 1), dtype=np.uint32)
-    for k, way in enumerate(on_way):
-        above[k, :len(way)] = way
-    number = np.arange(n, dtype=np.uint32)
-    ends = np.bincount(path[path >= 0], minlength=n) == 0
-    forks = {j for j in range(n) if sum(j in way for way, end in zip(on_way, ends) if end) > 1} | set(range(base))
-    inner = np.array([sum(j in forks for j in way[:-1]) for way in on_way], dtype=np.uint32)
-    order = base + np.argsort(depth[base:], kind="stable").astype(np.uint32)
-    return {"depth": depth, "above": above, "number": number, "every": np.tile(number, (n, 1)), "inner": inner, "order": order,
-            "forks": np.array([k in forks for k in range(n)]),
-            "limbs": np.array([k for k in order if int(k) not in forks], dtype=np.uint32),
-            "joined": np.array([k for k in range(base, n) if inner[k] > base or k in forks], dtype=np.uint32)}
-
-
-def _groups(path: Ints) -> Numbers:
-    """Trees of Drake's forest: velocities with a common end of their paths."""
-    group = np.empty(len(path), np.uint32)
-    trees = 0
-    for k, before in enumerate(path):
-        group[k] = trees if before < 0 else group[before]
-        trees += int(before < 0)
-    return group
 
 
 def carried(M: SpatialInertia, X: RigidTransform) -> SpatialInertia:

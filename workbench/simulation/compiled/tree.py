@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from workbench.simulation.compiled.arrays import Array, Ints, State, Tree, Work
+from workbench.simulation.compiled.arrays import Array, Numbers, State, Tree, Work
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.vectors import cross, quat_of, turned, write_rotation
 
@@ -142,7 +142,7 @@ def gather(tree: Tree, state: State, dt: float, w: Work) -> None:
     gravity, and joints' damping and springs, to w.force."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
-    i = n
+    i = int(n)
     while i > 0:
         i -= 1
         k = o + i
@@ -191,7 +191,7 @@ def _gather_base(tree: Tree, n: int, w: Work) -> None:
 
 
 @part
-def factor(depth: Ints, above: Ints, H: Array) -> None:
+def factor(depth: Numbers, above: Numbers, H: Array) -> None:
     """H = L' L in place (Featherstone 2008, table 6.3). depth, above: as in `Tree`, or `Tree.number` and `Tree.every`."""
     for k in range(depth.shape[0] - 1, -1, -1):
         d = math.sqrt(H[k, depth[k]])
@@ -206,7 +206,7 @@ def factor(depth: Ints, above: Ints, H: Array) -> None:
 
 
 @part
-def solve_factored(depth: Ints, above: Ints, H: Array, x: Array) -> None:
+def solve_factored(depth: Numbers, above: Numbers, H: Array, x: Array) -> None:
     """x := (L' L)^-1 x."""
     n = depth.shape[0]
     for i in range(n - 1, -1, -1):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.simulation.compiled.arrays import Numbers, Servos, State, Tree
-from workbench.simulation.compiled.lanes.number import LANES
+from workbench.simulation.compiled.number import LANES
 from workbench.types import Array
 
 

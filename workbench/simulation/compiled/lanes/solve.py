@@ -9,21 +9,11 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import State, Tree
+from workbench.simulation.compiled.cost import COST_ABSOLUTE, COST_RELATIVE, LINE_TOLERANCE, LONGEST_STEP, MOST_ITERATIONS
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.lanes.arrays import Room
-from workbench.simulation.compiled.lanes.number import Mask, Wide, anywhere, least, most, where, wide, within
-from workbench.simulation.compiled.solve import (
-    ABSOLUTE,
-    COST_ABSOLUTE,
-    COST_RELATIVE,
-    LIMIT_STIFFNESS,
-    LIMIT_WINDOW,
-    LINE_TOLERANCE,
-    LONGEST_STEP,
-    MOST_ITERATIONS,
-    NEAR_RIGID,
-    RELATIVE,
-)
+from workbench.simulation.compiled.number import Mask, Wide, anywhere, least, most, where, wide, within
+from workbench.simulation.compiled.solve import ABSOLUTE, LIMIT_STIFFNESS, LIMIT_WINDOW, NEAR_RIGID, RELATIVE
 from workbench.simulation.compiled.tree import copy_matrix, factor, solve_factored, times_matrix
 
 

@@ -21,9 +21,10 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, models, overload, register_model
 from numba.np.arrayobj import populate_array
 
+from workbench.simulation.compiled.arrays import ROW
 from workbench.simulation.compiled.kernel import part
 
-LANES = 8
+LANES = ROW
 """Robots at once: two registers of AVX2, whose operations then overlap, or one of AVX-512. Where vectors are narrower, LLVM takes
 more of them; where there are none, it computes one lane after the other, and nothing is gained."""
 Wide = Any
