@@ -156,6 +156,15 @@ def test_ends_that_registers_set_refute_nothing():
     assert at_their_end(h, [held])
 
 
+def test_the_speed_at_which_friction_fades_is_at_no_end():
+    """The reach of load friction is a share of the load: a fade speed of 8 or 60 deg/s is not compared with it."""
+    pool = replace(candidate("load_friction").with_options(["static"]), reach=1.2)
+    for share, speed in [(0.3, 8.0), (0.3, 60.0), (1.0, 20.0), (0.3, 400.0)]:
+        assert not at_their_end(start(()).with_effect(pool, pool.sizes((share, share, speed))), [pool])
+    low = replace(pool, reach=0.2)
+    assert at_their_end(start(()).with_effect(low, low.sizes((0.3, 0.3, 8.0))), [low])
+
+
 def test_every_number_of_the_law_that_an_effect_changes_too_is_paired_with_it():
     """Their sum alone is seen, of a zero as of a friction."""
     numbers = (Uncertain(JOINT, "coulomb_friction", 0.2), Uncertain(JOINT, ZERO, 0.02))

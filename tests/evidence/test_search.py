@@ -100,6 +100,29 @@ def test_what_a_coarse_step_fitted_wrongly_is_fitted_anew_before_it_is_judged():
     assert p.best.hypothesis.theta[-1] == pytest.approx(2.0, rel=0.05)
 
 
+class Saturating(Linear):
+    """A saturation of typical size or more does the opposite of a weaker one."""
+
+    def left(self, h):
+        sizes = [x if c.name != "torque_saturation" else np.minimum(x, 2.0 - 2.5 * x) for c, x in h.sizes()]
+        return super().left(h.at(np.concatenate([h.z, *sizes])))
+
+
+def test_an_effect_is_exchanged_for_one_of_its_kind_that_no_line_predicts():
+    """Looked at from its typical size on, the saturation makes everything worse; the ceiling does nearly the same as it."""
+    names = (*NAMES, "torque_ceiling")
+    of = region([candidate(n) for n in names], noise=2e-3)
+    n = len(of.likelihood.known)
+    signals = waves(0, n, len(names) + 1)
+    does = {f"{name}.{candidate(name).parameters[0].name}": signal for name, signal in zip(names, signals)}
+    does["torque_saturation.torque"] = 3.0 * signals[-2] + 0.6 * signals[-1]
+    does[NUMBER] = 0.3 * waves(1, n, 1)[0]
+    truth = 0.5 * does["torque_saturation.torque"] + np.random.default_rng(1).normal(size=n) * 2e-3
+    _, _, p = searched(Saturating(None, None, (of,), (start(of.numbers),), None, None, truth=truth, does=does))
+    assert [c.name for c in p.best.hypothesis.effects] == ["torque_saturation"]
+    assert p.best.hypothesis.theta[-1] == pytest.approx(0.5, rel=0.05)
+
+
 def test_what_recalibration_explains_is_no_effect():
     _, _, p = searched(robot({}, number=1.5))
     assert not p.best.hypothesis.effects

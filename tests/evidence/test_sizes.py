@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from tests.evidence.linear import JOINT, candidate
 from workbench.effects.registry import known_effects
-from workbench.identify.evidence.hypothesis import Prior, start
+from workbench.identify.evidence.hypothesis import Prior, Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.robot import puppy_model
@@ -72,3 +73,18 @@ def test_no_number_goes_further_than_twice_that_and_a_stiffness_has_no_end():
     assert reach["backlash"] == pytest.approx(8.0)
     assert np.exp(reach["friction_asymmetry"]) == pytest.approx(2.5**2)
     assert reach["joint_compliance"] == np.inf
+
+
+def test_options_and_effects_that_are_zero_are_dropped():
+    """Load friction with nothing at rest is load friction; it vanishes only where all that makes it is zero."""
+    both, play = candidate("load_friction", ("backdrive", "static")), candidate("backlash")
+    h = start((Uncertain(JOINT, "number 0", 0.1),)).with_effect(both, np.array([2.0, 0.0, -1.0, 0.3]))
+    h = h.with_effect(play, np.zeros(1))
+    less, remain = h.without_zero()
+    assert [(c.name, c.options) for c in less.effects] == [("load_friction", ("backdrive",))]
+    assert less.theta.tolist() == [0.0, 2.0, 0.3]
+    assert remain.tolist() == [True, True, False, False, True, False]
+    assert h.at(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])).without_zero()[0].effects == ()
+    only = h.at(np.array([0.0, 0.0, 0.5, 1.0, 0.0, 0.0])).without_zero()[0]
+    assert [(c.name, c.options) for c in only.effects] == [("load_friction", ("static",))]
+    assert only.without_zero()[1].all()

@@ -66,6 +66,22 @@ def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_na
     assert "`--model`" in said
 
 
+def test_another_option_of_an_effect_that_stays_is_no_name_of_the_tie():
+    """Load friction could still get its part at rest."""
+    names = [candidate("ground_tilt"), candidate("load_friction")]
+    here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.5),))
+    rng = np.random.default_rng(3)
+    torque, rubs = rng.normal(size=(2, 1600)) * 0.1
+    does = {"torque_at_full_duty": torque, "load_friction.coefficient": rubs, "load_friction.static": 0.5 * rubs,
+            "ground_tilt.forward": -SHIFT * torque}
+    truth = -math.log(0.6) * torque + rubs + 1e-3 * rng.normal(size=1600)
+    rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=truth, does=does)
+    h = start(here.numbers).with_effect(names[1], np.ones(1))
+    fit = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, h, 0.1, 2 * OPTIONS.iterations)})[0]
+    fits = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
+    assert {g.hypothesis.effects[-1].name for g in fits.names} == {"ground_tilt"}
+
+
 def test_variation_between_days_is_not_reported():
     assert found(0.05, 0.5)[2] is None
 

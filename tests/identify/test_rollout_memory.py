@@ -26,6 +26,7 @@ def kept(folder, most=MANY):
 
 
 def test_what_is_kept_is_told_to_the_bit_by_this_run_and_by_the_next(tmp_path):
+    tmp_path /= "new/folder"
     here, again = kept(tmp_path), RolloutMemory(tmp_path, MANY)
     again.keep("coarse", np.float32([[1.5, np.nan]]))
     for memory in (here, again, RolloutMemory(tmp_path, MANY)):

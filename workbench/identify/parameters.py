@@ -112,6 +112,16 @@ class Candidate:
         c = Candidate.of(self.effect, self.where, neutral, options=tuple(sorted({*options})), lowest=self.lowest)
         return c.one_way()[-1] if self.less else c
 
+    def without_zero(self, x: Array) -> tuple[Candidate, Mask]:
+        """The same without the options of which all sizes x that make them are zero, and which sizes remain (all false if none
+        makes anything)."""
+        made = self.makes & ~np.isclose(x, 0.0)
+        if not self.options:
+            return self, np.full(len(x), made.any())
+        options = np.array([p.option for p, fixed in zip(self.parameters, self.fixed) if not fixed])
+        kept = [o for o in self.options if o not in options or made[options == o].any()]
+        return (self if len(kept) == len(self.options) else self.with_options(kept)), np.isin(options, ["", *kept]) & made.any()
+
     @cached_property
     def size(self) -> int:
         """How many numbers are fitted."""
@@ -225,6 +235,8 @@ def _at(p: Parameter, size: float, neutral: float, typical: float) -> float:
 
 def _size(p: Parameter, value: float, neutral: float, typical: float) -> float:
     """The size of a number at a value."""
+    if p.shapes:
+        return math.log2(value / neutral)
     if p.logarithmic:
         return math.log(value / neutral) / math.log(typical / neutral)
     return (value - neutral) / (typical - neutral)

@@ -137,6 +137,13 @@ class Hypothesis:
         keep = [(c, x) for c, x in self.sizes() if not gone(c)]  # type: ignore[operator]
         return replace(self, effects=tuple(c for c, _ in keep), theta=np.concatenate([self.z, *(x for _, x in keep)]))
 
+    def without_zero(self) -> tuple[Hypothesis, Mask]:
+        """Without the effects, and options of effects, that are zero; which of theta's numbers remain (k,)."""
+        each = [(*c.without_zero(x), x) for c, x in self.sizes()]
+        effects = tuple(c for c, remain, _ in each if remain.any())
+        remain = np.concatenate([np.ones(len(self.numbers), dtype=bool), *(remain for _, remain, _ in each)])
+        return replace(self, effects=effects, theta=self.theta[remain]), remain
+
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of theta, lower and upper."""
         n = len(self.numbers)

@@ -65,6 +65,18 @@ def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[
     return best_of_each([_best_along(region, options, f, probes) for probes in along])
 
 
+def akin(region: Region, options: EvidenceOptions, h: Hypothesis) -> list[list[Hypothesis]]:
+    """The hypothesis with one of its effects exchanged for one that acts like it, of its family or tied with it, or with one more
+    option of an effect, at several sizes. Not with a vector, of which no size is typical."""
+    made: list[tuple[Hypothesis, Candidate]] = []
+    for gone in h.effects:
+        kinds, rest = {gone.effect.family, gone.effect.tied} - {None}, h.without(lambda c, gone=gone: c is gone)
+        made += [(rest, c) for c in extensions(region, rest)
+                 if c.name != gone.name and kinds & {c.effect.family, c.effect.tied} and not c.of_vector.any() and not c.read_off]
+    made += [(h, c) for c in extensions(region, h) if c.key in {own.key for own in h.effects}]
+    return [[rest.with_effect(c, np.where(c.shapes, 0.0, share)) for share in options.sizes] for rest, c in made]
+
+
 def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:
     """Every extension of a hypothesis as it stands, without a fit of it."""
     (r,) = yield [h]

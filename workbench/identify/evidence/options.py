@@ -89,13 +89,14 @@ class EvidenceOptions:
     the nominal law, in standard deviations; its prior prices it. stride: step of finite differences, in prior standard deviations
     or typical sizes; stick and slip answer smaller steps with noise. spread: the same for the simultaneous moves of the last
     slopes, half a prior standard deviation. iterations: most steps of a fit. starts: starting points of the plain fit: through
-    stick and slip, fits of one model end up to 20 nats apart, and an effect would win only for lack of a better plain fit. beam:
-    states that are extended, and single-effect moves fitted for each; refined: fitted moves of one or two effects, led of
-    them sharing their first effect; paired: best moves that are also predicted in pairs. most: effects of one joint. seconds: of
-    all takes together that the search uses, from their beginnings; finished: of all takes together that the last
-    fit uses, twice as long, as its rollouts have a finer step. most_work [s]: of a puppy's
-    rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one
-    processor, several times the cost of twelve servo logs.
+    stick and slip, fits of one model end up to 20 nats apart, and an effect would win only for lack of a better plain fit. sizes:
+    shares of the typical sizes from which the best models are fitted again, for the same reason, and those that differ from them
+    in one effect of the same kind. beam: states that are extended, and single-effect moves fitted for each; refined: fitted moves
+    of one or two effects, led of them sharing their first effect; paired: best moves that are also predicted in pairs. most:
+    effects of one joint. seconds: of all takes together that the search uses, from their beginnings; finished: of all takes
+    together that the last fit uses, twice as long, as its rollouts have a finer step. most_work [s]: of a puppy's rollouts at the
+    search's step (`RolloutEvaluator.work`), after which a search that is not thorough stops: about an hour of one processor,
+    several times the cost of twelve servo logs.
 
     drift: how much a robot that was diagnosed before may have changed; None: the nominal robot is as designed. motion: how a
     joint's range of motion is measured. faster: where a joint moves this many times faster than that diagnosis saw it, what its
@@ -123,6 +124,7 @@ class EvidenceOptions:
     spread: float = 0.5
     iterations: int = 5
     starts: int = 4
+    sizes: tuple[float, ...] = (0.5, 1.0, 2.0)
     beam: int = 3
     refined: int = 9
     led: int = 2

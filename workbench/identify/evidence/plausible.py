@@ -17,8 +17,8 @@ from workbench.types import Array
 
 
 def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Reason]:
-    """The effects of which a number went as far as this robot lets it. pool: as `candidates` made them, with `Effect.reach` and
-    not with what registers say."""
+    """The effects of which a number went as far as this robot lets it; one that only shapes an effect has no such end, as
+    `Effect.reach` says nothing of it. pool: as `candidates` made them, with `Effect.reach` and not with what registers say."""
     reaches, out = {c.key: c.reach for c in pool}, dict[Candidate, Reason]()
     for c, x in h.sizes():
         far = CONCLUSIONS.at_its_end * reaches.get(c.key, math.inf)
@@ -30,10 +30,12 @@ def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Re
 
 
 def _distances(c: Candidate, x: Array) -> Iterator[tuple[Parameter, float, float]]:
-    """Each parameter, its value, and its distance from neutral; for a vector, its length instead of its value."""
+    """Each parameter but those that only shape the effect, its value, and its distance from neutral; for a vector, its length
+    instead of its value."""
     values, neutral = iter(c.values(x)), iter(c.neutral)
     for p in c.given:
         n = 3 if p.vector else 1
         v, at = np.array(list(islice(values, n))), np.array(list(islice(neutral, n)))
         away = float(np.linalg.norm(v - at)) if p.vector or not np.isfinite(at).all() else p.distance(float(v[0]), float(at[0]))
-        yield p, float(np.linalg.norm(v)) if p.vector else float(v[0]), away
+        if not p.shapes:
+            yield p, float(np.linalg.norm(v)) if p.vector else float(v[0]), away

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import hadamard
 
 from workbench.identify.evidence.fit import (
     Asks,
@@ -21,9 +20,18 @@ from workbench.identify.evidence.fit import (
     with_better,
 )
 from workbench.identify.evidence.hypothesis import Hypothesis, start
-from workbench.identify.evidence.linearise import Move, best_of_each, choose_moves, in_pairs, linearise, linearised_around
+from workbench.identify.evidence.linearise import (
+    Move,
+    akin,
+    best_of_each,
+    choose_moves,
+    in_pairs,
+    linearise,
+    linearised_around,
+)
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.starts import as_published, at_typical_sizes, fit_from_starts, restart, spread
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
@@ -35,11 +43,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Found:
-    """Fits of one region, by their set of effects, and which of these were extended by every other effect."""
+    """Fits of one region, by their set of effects; which of these were extended by every other effect, and which were fitted from
+    typical sizes again."""
 
     region: Region
     fits: Mapping[Key, Fitted]
     extended: frozenset[Key] = frozenset()
+    restarted: frozenset[Key] = frozenset()
 
     @property
     def best(self) -> Fitted:
@@ -136,19 +146,7 @@ def _begin(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
     (r,) = yield [h]
     region = region.with_correlation_time(min(options.explored, region.correlation(r)))
     s = region.likelihood.discrepancy(r)
-    starts = _spread(h, options.starts)
-    fits = yield from side_by_side([fit_hypothesis(region, options, at, s, options.iterations) for at in starts])
-    better = yield from side_by_side([polish(region, options, f) for f in fits])
-    fit = yield from polish(region, options, max(better, key=lambda f: f.log_posterior))
-    return region, fit
-
-
-def _spread(h: Hypothesis, starts: int) -> list[Hypothesis]:
-    """Starting points of a plain fit: as published, and others, in which every number is a standard deviation away to one side or
-    the other."""
-    n = len(h.theta)
-    signs = hadamard(1 << max(n, starts).bit_length())[1:starts, 1:n + 1]
-    return [h, *(h.at(np.clip(h.theta + row, *h.bounds())) for row in signs)]
+    return region, (yield from fit_from_starts(region, options, spread(h, options.starts), s))
 
 
 def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
@@ -158,7 +156,9 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """If the best fit cannot be extended to a better one: drops each of its effects in turn, fitted from the current parameters,
-    so that a poorly converged smaller model does not justify an extra effect; and exchanges each for others."""
+    so that a poorly converged smaller model does not justify an extra effect; exchanges each for others; and fits the best anew,
+    and those that differ from them in one effect of the same kind: what a ceiling of the torque explains is hardly predicted of
+    a saturation, but fitted."""
     if found.best.hypothesis.key not in found.extended:
         return found
     best, region = found.best, found.region
@@ -166,7 +166,15 @@ def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
     made = yield from side_by_side([fit_hypothesis(region, options, h, best.discrepancy, options.iterations, None, J)
                                     for h, J in states])
     fits = with_better(found.fits, made)
-    return (yield from _extend(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
+    again: dict[Key, list[Hypothesis]] = {}
+    for starts in (*akin(region, options, best.hypothesis),
+                   *([at_typical_sizes(f.hypothesis, share) for share in options.sizes] for f in found.beam(options))):
+        if starts[0].effects and starts[0].key not in found.restarted:
+            again.setdefault(starts[0].key, []).extend(starts)
+    made = yield from restart(region, options, list(again.values()), best.discrepancy)
+    fits = with_better(fits, [*made, *(reduce(region, options, f) for f in made)])
+    found = replace(found, fits=fits, restarted=found.restarted | frozenset(again))
+    return (yield from _extend(found, options, [fits[h.key] for h, _ in states], options.beam))
 
 
 def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
@@ -191,7 +199,7 @@ def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], re
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polish(region, options, f) for f in ahead])
     fits = with_better(fits, [*better, *(reduce(region, options, f) for f in (*made, *better))])
-    return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
+    return replace(found, fits=fits, extended=found.extended | {f.hypothesis.key for f in states})
 
 
 def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
@@ -205,13 +213,10 @@ def _from_published(region: Region, options: EvidenceOptions, f: Fitted) -> Asks
 
 
 def reduce(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
-    """A fit without the effects that came to nothing in it: a smaller model must not lose because it was searched for less."""
-    def vanished(c: Candidate) -> bool:
-        x = f.hypothesis.theta[f.hypothesis.slices()[f.hypothesis.effects.index(c)]]
-        return bool(np.allclose(x[~c.shapes], 0.0))  # at the end of its range
-
-    h, J = drop_effects(f, vanished)
-    return f if h.key == f.hypothesis.key else evaluate(region, options, h, f.r, J)
+    """A fit without the effects, and without the options of effects, that came to nothing in it: a smaller model must not lose
+    because it was searched for less."""
+    h, remain = f.hypothesis.without_zero()
+    return f if remain.all() else evaluate(region, options, h, f.r, f.J[:, remain])
 
 
 def _fit_move(region: Region, options: EvidenceOptions, f: Fitted, m: Move, published: Move | None = None) -> Asks[Fitted]:
@@ -222,7 +227,7 @@ def _fit_move(region: Region, options: EvidenceOptions, f: Fitted, m: Move, publ
     s, J = f.discrepancy, None if shaped else m.J
     fits = yield from side_by_side([
         fit_hypothesis(region, options, h, s, options.iterations, None, J),
-        fit_hypothesis(region, options, _as_published(h), s, options.iterations, None, J) if published is None else
+        fit_hypothesis(region, options, as_published(h), s, options.iterations, None, J) if published is None else
         fit_hypothesis(region, options, published.hypothesis, s, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
@@ -248,13 +253,8 @@ def _refit(found: Found, options: EvidenceOptions) -> Asks[Found]:
     near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if f.log_posterior > least][:options.refined]
     made = yield from side_by_side([
         *(polish(region, options, f) for f in near),
-        *(fit_hypothesis(region, options, _as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
+        *(fit_hypothesis(region, options, as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
     return replace(found, fits=with_better(found.fits, [*made, *(reduce(region, options, f) for f in made)]))
-
-
-def _as_published(h: Hypothesis) -> Hypothesis:
-    """The hypothesis with none of the nominal law's numbers recalibrated."""
-    return h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
 
 
 def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) -> Found:

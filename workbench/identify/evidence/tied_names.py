@@ -108,7 +108,8 @@ def _each_alone(published: Region, options: EvidenceOptions, without: Hypothesis
     for z in (without.z, np.clip(as_fitted, -FAR, FAR)):
         moves += (yield from linearised_around(published, options, without.at(np.concatenate([z, without.theta[len(z):]]))))[1]
     fits = yield from side_by_side([
-        fit_hypothesis(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+        fit_hypothesis(published, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves
+        if all(competes(c) for c in m.added)])  # not another option of an effect that stays
     fits = yield from side_by_side([polish(published, options, g) for g in fits])
     return list(with_better({}, fits).values())
 

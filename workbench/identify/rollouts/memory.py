@@ -55,6 +55,7 @@ class RolloutMemory:
         self._places: dict[bytes, _Place] = {}
         self._written: int | None = None
         if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
             for path in sorted(folder.glob(f"*{SUFFIX}")):
                 self._read(path)
 
