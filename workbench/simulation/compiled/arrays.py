@@ -198,10 +198,10 @@ class Work(NamedTuple):
     """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational.
 
     M and H have row k's entries in the columns of `Tree.above[k]`; the Jacobian J (c, 3, ..) of contact c has its own in the
-    columns of `Tree.above[last[c]]`, the last velocity that moves it, or of `Tree.every` where its links are on two branches: then
-    other[c] is the other's last, else -1. Columns behind them hold anything. pivot (nv,): the diagonal of H's factor. crossed
-    (1,): whether any contact has links on two branches; whole (nv, nv): H then. shape[c]: of a contact on the floor, or -1 between
-    links. frame (3, 3): axes of the contact that is being found, in rows."""
+    columns of `Tree.above[last[c]]`, the last velocity that moves it, or of `Tree.every` where its links are on two branches:
+    then other[c] is the other's last, else -1. Columns behind them hold anything. pivot (nv,): the diagonal of H's factor.
+    crossed (1,): whether any contact has links on two branches; whole (nv, nv): H then. shape[c]: of a contact on the floor,
+    or -1 between links. frame (3, 3): axes of the contact that is being found, in rows."""
 
     R: Array
     p: Array
