@@ -16,7 +16,7 @@ from workbench.robot.torque_table import TorqueTable
 from workbench.simulation import Job, SimulationConfig
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.compiled.lanes import together
-from workbench.simulation.compiled.lanes.number import LANES
+from workbench.simulation.compiled.number import LANES
 from workbench.simulation.steady import JointStates
 
 SAME = 1e-12

@@ -47,18 +47,20 @@ def delay_commands(commands: Commands, columns: Iterable[int], late: float, swit
     times = times[np.diff(times, prepend=-np.inf) > SAME]
     now, before = (np.searchsorted(commands.times, times - s + SAME, side="right") - 1 for s in (0.0, late))
     first, shifted = np.maximum(now, 0), np.maximum(before, 0)
-    waits = not commands.begun  # in neutral
-    neutral_now, neutral_before = (now < 0)[:, None] & waits, (before < 0)[:, None] & waits
+    waiting = slice(0, 0 if commands.begun else None)  # of the rows before a first command: in neutral
+    neutral_now, neutral_before = np.flatnonzero(now < 0)[waiting], np.flatnonzero(before < 0)[waiting]
 
-    def hold(rows: np.ndarray, neutral: float) -> np.ndarray:
-        out = np.where(neutral_now, neutral, rows[first])
-        out[:, columns] = np.where(neutral_before, neutral, rows[shifted][:, columns])
+    def hold(rows: np.ndarray, neutral: float, delayed: bool = True) -> np.ndarray:
+        out = rows[first]
+        out[neutral_now] = neutral
+        if delayed:
+            own = rows[:, columns][shifted]
+            own[neutral_before] = neutral
+            out[:, columns] = own
         return out
 
-    enabled = hold(commands.enabled, True) if switched else np.where(neutral_now, True, commands.enabled[first])
     return Commands(times, commands.joints, hold(commands.goals, 0.0), hold(commands.speeds, 0.0),
-                    enabled.astype(bool), commands.end + late, commands.poses[first],
-                    commands.begun)
+                    hold(commands.enabled, True, switched), commands.end + late, commands.poses[first], commands.begun)
 
 
 def _since(commands: Commands, time: float) -> Commands:

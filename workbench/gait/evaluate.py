@@ -122,7 +122,8 @@ class Evaluator:
     def measure(self, runs: Sequence[tuple[GaitShape, RobotModel]]) -> list[GaitMeasure]:
         """Measures of each shape on a robot of its own, which is on the slope already. InputError where a goal is beyond the
         registers."""
-        return self._measures([(gait_table(self.machine, shape), robot) for shape, robot in runs])
+        tables = {shape: gait_table(self.machine, shape) for shape in dict.fromkeys(shape for shape, _ in runs)}
+        return self._measures([(tables[shape], robot) for shape, robot in runs])
 
     def _table(self, paths: Paths) -> tuple[GaitTable | None, list[Margin]]:
         limits = self.request.limits

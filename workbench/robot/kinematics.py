@@ -116,11 +116,19 @@ class Kinematics:
             f = self.frames[name]
             p, R = poses[f.parent]
             p_F = p + R @ f.X_PF_p
-            R_F = R @ f.X_PF_R
+            R_F = _turned(R, f.X_PF_R)
             if name in column:
                 R_F = R_F @ rotation_about(f.axis, q[:, column[name]])
-            poses[link] = (p_F + R_F @ f.X_MB_p, R_F @ f.X_MB_R)
+            poses[link] = (p_F + R_F @ f.X_MB_p if f.X_MB_p.any() else p_F, _turned(R_F, f.X_MB_R))
         return poses
+
+
+_ONE = np.eye(3)
+
+
+def _turned(R: Array, by: Array) -> Array:
+    """R (N, 3, 3) times a matrix (3, 3), which is one in most descriptions."""
+    return R if np.array_equal(by, _ONE) else R @ by
 
 
 def rotation_about(axis: Array, angle: Array) -> Array:

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from workbench.types import Array
 
 Ints = NDArray[np.int64]
+Numbers = NDArray[np.uint32]
+"""Of velocities, bodies and columns. They have no sign, so that numba leaves out a test of each index for counting from the end;
+in short loops that took as long as the arithmetic."""
 
 
 BOX, CYLINDER, OTHER = 0, 1, 2
@@ -23,18 +26,31 @@ LINK_CONTACTS = 32
 
 
 class Tree(NamedTuple):
-    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint. path (nv,): the velocity before
-    each on the way to the root, -1 at its end; row (nv,): before each of them. group (nv,): the tree of Drake's forest that a
-    velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
-    inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
+    """Kinematics, inertia and joint forces. parent (n,): body that carries each joint, -1 for the root; carrier (n,): the same, n
+    for the root. path (nv,): the velocity before each on the way to the root, -1 at its end; depth (nv,): how many are on that
+    way; above (nv, d): they and the velocity itself, the root's first, zeros behind. number (nv,), every (nv, nv): the same as
+    depth and above if all velocities before one were on its way. order: velocities beyond a free base's by depth. forks (nv,):
+    whether limbs part at a velocity or beyond it; a base's count as such. limbs: those that are none, by depth. inner (nv,): how
+    many forks are on the way. joined: forks beyond the base and velocities beyond such. group (nv,): the tree of Drake's forest
+    that a velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3)
+    and inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
     stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while
     it holds. gravity, pull (3,): the latter on the base's origin."""
 
     free: bool
     parent: Ints
+    carrier: Numbers
     path: Ints
-    row: Ints
-    group: Ints
+    depth: Numbers
+    above: Numbers
+    number: Numbers
+    every: Numbers
+    order: Numbers
+    forks: NDArray[np.bool_]
+    limbs: Numbers
+    inner: Numbers
+    joined: Numbers
+    group: Numbers
     R: Array
     p: Array
     axis: Array
@@ -64,7 +80,7 @@ class Servos(NamedTuple):
     of the law. table_servo, table_of (t,): the servo of each torque table, and its argument (`workbench.servo.tabled`);
     table_at, table_torque (t, K): its knots and torques."""
 
-    joint: Ints
+    joint: Numbers
     zero: Array
     gain: Array
     margin: Array
@@ -106,7 +122,7 @@ class Shapes(NamedTuple):
     other. may_touch (s, s). pair (s, s): row in `pairs` of a sphere (first) and its partner in a contact that is known, -1
     of others; pairs (k, 4): stiffness, dissipation, friction, and where between the other (0) and the sphere (1) the point is."""
 
-    body: Ints
+    body: Numbers
     p: Array
     R: Array
     half: Array
@@ -117,10 +133,10 @@ class Shapes(NamedTuple):
     dissipation: Array
     friction: Array
     depth: Array
-    bodies: Ints
+    bodies: Numbers
     middle: Array
     reach: Array
-    near: Ints
+    near: Numbers
     may_touch: NDArray[np.bool_]
     pair: Ints
     pairs: Array
@@ -181,9 +197,11 @@ class Log(NamedTuple):
 class Work(NamedTuple):
     """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational.
 
-    Of contact c: shape[c] on the floor, or -1 between links; last[c]: the last velocity that moves it, along `Tree.path`, or
-    along `Tree.row` where its links are on two branches: then other[c] is the other's last, else -1. crossed (1,): whether any
-    has such links. frame (3, 3): axes of the contact that is being found, in rows."""
+    M and H have row k's entries in the columns of `Tree.above[k]`; the Jacobian J (c, 3, ..) of contact c has its own in the
+    columns of `Tree.above[last[c]]`, the last velocity that moves it, or of `Tree.every` where its links are on two branches:
+    then other[c] is the other's last, else -1. Columns behind them hold anything. pivot (nv,): the diagonal of H's factor.
+    crossed (1,): whether any contact has links on two branches; whole (nv, nv): H then. shape[c]: of a contact on the floor,
+    or -1 between links. frame (3, 3): axes of the contact that is being found, in rows."""
 
     R: Array
     p: Array
@@ -196,6 +214,8 @@ class Work(NamedTuple):
     F: Array
     M: Array
     H: Array
+    pivot: Array
+    whole: Array
     force: Array
     v_star: Array
     v_next: Array
@@ -232,18 +252,30 @@ class Work(NamedTuple):
     frame: Array
 
 
+ROW = 8
+"""Rows of matrices are a multiple of this long, and begin where processors load so many numbers at once."""
+
+
+def _rows(count: int, width: int) -> Array:
+    """Zeros (count, width), rows longer up to a multiple of ROW."""
+    width = -(-width // ROW) * ROW
+    raw = np.zeros(count * width + ROW)
+    begin = (-raw.ctypes.data // raw.itemsize) % ROW
+    return raw[begin:begin + count * width].reshape(count, width)
+
+
 def work_for(tree: Tree, servos: Servos, shapes: Shapes) -> Work:
     """Room for one run of a robot."""
     n, nv, m, c = len(tree.parent), len(tree.path), len(servos.joint), len(shapes.body) + LINK_CONTACTS
-    zeros = np.zeros
+    zeros, depth = np.zeros, tree.above.shape[1]
     return Work(
         R=zeros((n + 1, 3, 3)), p=zeros((n + 1, 3)), S=zeros((nv, 6)), mass=zeros(n + 1), moment=zeros((n + 1, 3)),
-        inertia=zeros((n + 1, 6)), V=zeros((n + 1, 6)), A=zeros((n + 1, 6)), F=zeros((n + 1, 6)), M=zeros((nv, nv)),
-        H=zeros((nv, nv)), force=zeros(nv), v_star=zeros(nv), v_next=zeros(nv), momentum=zeros(nv), momentum_star=zeros(nv),
-        gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv), dp=zeros(nv),
-        active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
+        inertia=zeros((n + 1, 6)), V=zeros((n + 1, 6)), A=zeros((n + 1, 6)), F=zeros((n + 1, 6)), M=_rows(nv, depth),
+        H=_rows(nv, depth), pivot=zeros(nv), whole=zeros((nv, nv)), force=zeros(nv), v_star=zeros(nv), v_next=zeros(nv),
+        momentum=zeros(nv), momentum_star=zeros(nv), gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv),
+        dp=zeros(nv), active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
         limit_on=zeros((n, 2), dtype=np.bool_), limit_v=zeros((n, 2)), limit_R=zeros(n), push=zeros(m), motor=zeros(m),
         relief=zeros(m), shape=zeros(c, dtype=np.int64), last=zeros(c, dtype=np.int64), other=zeros(c, dtype=np.int64),
-        crossed=zeros(1, dtype=np.bool_), stiffness=zeros(c), dissipation=zeros(c), friction=zeros(c), J=zeros((c, 3, nv)),
-        elastic=zeros(c), normal=zeros(c), soft=zeros(c), vc=zeros((c, 3)), dvc=zeros((c, 3)), hessian=zeros((c, 4)),
-        turned=zeros(4), frame=zeros((3, 3)))
+        crossed=zeros(1, dtype=np.bool_), stiffness=zeros(c), dissipation=zeros(c), friction=zeros(c),
+        J=_rows(3 * c, nv).reshape(c, 3, -1), elastic=zeros(c), normal=zeros(c), soft=zeros(c), vc=zeros((c, 3)),
+        dvc=zeros((c, 3)), hessian=zeros((c, 4)), turned=zeros(4), frame=zeros((3, 3)))

@@ -10,7 +10,7 @@ import math
 
 from workbench.simulation.compiled.arrays import Array, Shapes, State, Tree, Work
 from workbench.simulation.compiled.kernel import part
-from workbench.simulation.compiled.vectors import cross, turned
+from workbench.simulation.compiled.vectors import Three, cross, turned
 
 
 @part
@@ -48,8 +48,7 @@ def floor_contacts(tree: Tree, shapes: Shapes, state: State, dt: float, w: Work)
 @part
 def load_contact(tree: Tree, state: State, dt: float, c: int, depth: float, w: Work) -> None:
     """Velocity, elastic force and last step's normal impulse of a contact whose Jacobian and numbers are there."""
-    for r in range(3):
-        w.vc[c, r] = along(tree, c, w.J[c, r], state.v, w)
+    w.vc[c, 0], w.vc[c, 1], w.vc[c, 2] = along(tree, c, state.v, w)
     w.elastic[c] = w.stiffness[c] * depth
     w.normal[c] = dt * w.elastic[c] * max(0.0, 1.0 - w.dissipation[c] * w.vc[c, 2])
 
@@ -62,23 +61,29 @@ def _point_jacobian(tree: Tree, last: int, x: float, y: float, z: float, J: Arra
             J[r, k] = 0.0
         J[r, 3 + r] = 1.0
     J[0, 1], J[0, 2], J[1, 0], J[1, 2], J[2, 0], J[2, 1] = z, -y, -z, x, y, -x
-    j = last
-    while j >= 6:
+    for t in range(6, tree.depth[last] + 1):
+        j = tree.above[last, t]
         cx, cy, cz = cross(w.S[j, 0], w.S[j, 1], w.S[j, 2], x, y, z)
-        J[0, j], J[1, j], J[2, j] = w.S[j, 3] + cx, w.S[j, 4] + cy, w.S[j, 5] + cz
-        j = tree.path[j]
+        J[0, t], J[1, t], J[2, t] = w.S[j, 3] + cx, w.S[j, 4] + cy, w.S[j, 5] + cz
 
 
 @part
-def along(tree: Tree, c: int, row: Array, x: Array, w: Work) -> float:
-    """Product of a row of contact c's Jacobian and x, of the velocities that move it."""
-    path = tree.row if w.other[c] >= 0 else tree.path
-    total = 0.0
-    j = w.last[c]
-    while j >= 0:
-        total += row[j] * x[j]
-        j = path[j]
-    return total
+def deepest(tree: Tree, c: int, w: Work) -> int:
+    """The last column of contact c's Jacobian."""
+    return w.last[c] if w.other[c] >= 0 else tree.depth[w.last[c]]
+
+
+@part
+def along(tree: Tree, c: int, x: Array, w: Work) -> Three:
+    """Product of contact c's Jacobian and x, of all velocities."""
+    of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+    a = b = d = 0.0
+    for t in range(deepest(tree, c, w), -1, -1):
+        v = x[of[t]]
+        a += w.J[c, 0, t] * v
+        b += w.J[c, 1, t] * v
+        d += w.J[c, 2, t] * v
+    return a, b, d
 
 
 @part

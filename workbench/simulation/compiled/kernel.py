@@ -20,9 +20,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "fastmath": {"contract"}, "error_model": "numpy"}
 """No GIL; nothing is allocated, so nothing is counted; a product and a sum may be one instruction, with one rounding, but nothing
 is taken to be finite; 1/0 is infinity."""
-_SOURCES = ("arrays", "contact", "kernel", "links", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
-            "../../servo/tabled", "../../servo/term_bank", *(f"lanes/{name}" for name in (
-                "arrays", "links", "number", "play", "servo", "solve")))
+_SOURCES = ("arrays", "contact", "cost", "kernel", "links", "number", "put", "rows", "run", "servo", "solve", "tree", "vectors",
+            "../steady", "../../servo/tabled", "../../servo/term_bank", *(f"lanes/{name}" for name in (
+                "arrays", "links", "play", "servo", "solve")))
 
 
 @cache

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import CYLINDER, Shapes, State, Tree, Work
-from workbench.simulation.compiled.contact import box_reach, load_contact, shape_height
+from workbench.simulation.compiled.contact import box_reach, deepest, load_contact, shape_height
 from workbench.simulation.compiled.kernel import part, rare
 from workbench.simulation.compiled.vectors import Four, Three, clamp, cross, turned
 
@@ -104,8 +104,8 @@ def _add_contact(tree: Tree, shapes: Shapes, state: State, dt: float, ball: int,
     _write_branches(tree, count, o + a if a < n else o - 1, o + b if b < n else o - 1, w)
     _write_frame(count, nx, ny, nz, w)
     for r in range(3):
-        for j in range(tree.path.shape[0]):
-            w.J[count, r, j] = 0.0
+        for t in range(deepest(tree, count, w) + 1):
+            w.J[count, r, t] = 0.0
     _add_velocities(tree, count, o + a if a < n else o - 1, 1.0, x - back * nx, y - back * ny, z - back * nz, w)
     _add_velocities(tree, count, o + b if b < n else o - 1, -1.0, x - back * nx, y - back * ny, z - back * nz, w)
     load_contact(tree, state, dt, count, depth, w)
@@ -144,9 +144,10 @@ def _add_velocities(tree: Tree, c: int, last: int, sign: float, x: float, y: flo
     while j >= 0:
         cx, cy, cz = cross(w.S[j, 0], w.S[j, 1], w.S[j, 2], x, y, z)
         cx, cy, cz = turned(w.frame, sign * (w.S[j, 3] + cx), sign * (w.S[j, 4] + cy), sign * (w.S[j, 5] + cz))
-        w.J[c, 0, j] += cx
-        w.J[c, 1, j] += cy
-        w.J[c, 2, j] += cz
+        t = j if w.other[c] >= 0 else tree.depth[j]
+        w.J[c, 0, t] += cx
+        w.J[c, 1, t] += cy
+        w.J[c, 2, t] += cz
         j = tree.path[j]
 
 

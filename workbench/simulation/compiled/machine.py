@@ -14,7 +14,7 @@ from workbench.robot import RobotModel
 from workbench.servo.bank import HOLDING_DAMPING, MOST_CREEP
 from workbench.servo.tabled import arrays_of
 from workbench.servo.terms import TermNumbers, most_friction
-from workbench.simulation.compiled.arrays import OTHER, Array, Ints, Servos, Shapes, Tree
+from workbench.simulation.compiled.arrays import OTHER, Array, Ints, Numbers, Servos, Shapes, Tree
 from workbench.simulation.compiled.tables import NotCoveredError, ShapeTable, Tables
 from workbench.simulation.contact import RIGID_STIFFNESS, partner_friction
 
@@ -35,7 +35,7 @@ def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, 
     missing = [j for j in model.joints if j not in tables.joints]
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")
-    joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.int64)
+    joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.uint32)
     kept = f"shapes, {'apart' if apart else 'touching'}"
     shapes = None if free else tables.derived.get(kept)  # of a held robot nothing but the tables decides them
     if not isinstance(shapes, Shapes):
@@ -43,7 +43,7 @@ def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, 
     return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), shapes)
 
 
-def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
+def _tree(physics: Physics, tables: Tables, joint: Numbers, dt: float) -> Tree:
     armature, damping = tables.tree.armature.copy(), tables.tree.damping.copy()
     stages = [tables.joints.index(s) for names in physics.stages.values() for s in names]
     damping[stages] *= max(1.0, dt / (2 * SPRING_TIME))  # as the station steadies springs
@@ -56,7 +56,7 @@ def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
                                 gravity=np.array(physics.gravity, dtype=float), pull=np.array(physics.tether, dtype=float))
 
 
-def _servos(physics: Physics, joint: Ints) -> Servos:
+def _servos(physics: Physics, joint: Numbers) -> Servos:
     law, n = physics.law, len(joint)
     numbers: list[TermNumbers] = []
     for term in physics.servo_terms:
@@ -104,9 +104,9 @@ def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool, apa
             if t.may_touch[np.ix_(t.body == a, t.body == b)].any()]
     pair, pairs = _between(t, own, apart)
     return Shapes(
-        body=t.body, p=t.p, R=t.R, half=t.half, radius=t.radius, solid=t.solid, size=size, stiffness=stiffness,
-        dissipation=dissipation, friction=friction, depth=depth, bodies=bodies, middle=middle, reach=reach,
-        near=np.array(near, dtype=np.int64).reshape(-1, 2), may_touch=t.may_touch, pair=pair, pairs=pairs)
+        body=t.body.astype(np.uint32), p=t.p, R=t.R, half=t.half, radius=t.radius, solid=t.solid, size=size, stiffness=stiffness,
+        dissipation=dissipation, friction=friction, depth=depth, bodies=bodies.astype(np.uint32), middle=middle, reach=reach,
+        near=np.array(near, dtype=np.uint32).reshape(-1, 2), may_touch=t.may_touch, pair=pair, pairs=pairs)
 
 
 def _materials(model: RobotModel, physics: Physics, t: ShapeTable, free: bool) -> Array:

@@ -13,10 +13,21 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import State, Tree, Work
-from workbench.simulation.compiled.contact import along
-from workbench.simulation.compiled.kernel import part
-from workbench.simulation.compiled.tree import copy_paths, factor, solve_factored, times_matrix
-from workbench.simulation.compiled.vectors import clamp
+from workbench.simulation.compiled.contact import along, deepest
+from workbench.simulation.compiled.cost import (
+    COST_ABSOLUTE,
+    COST_RELATIVE,
+    MOST_ITERATIONS,
+    cost_along,
+    limit_impulse,
+    normal_impulse,
+    step_length,
+)
+from workbench.simulation.compiled.kernel import part, rare
+from workbench.simulation.compiled.number import LANES, put_stretch, stretch
+from workbench.simulation.compiled.rows import copy_rows, factor_rows, solve_rows, times_rows
+from workbench.simulation.compiled.tree import factor, solve_factored
+from workbench.simulation.compiled.vectors import Three, clamp
 
 STICTION = 1e-4
 """Slip speed below which a contact sticks [m/s]: MultibodyPlant's default stiction tolerance."""
@@ -30,10 +41,6 @@ LIMIT_WINDOW = 2.0
 """Limits farther away than this many steps' travel are left out."""
 RELATIVE, ABSOLUTE = 1e-6, 1e-14
 """Of the momentum's balance, as shares of momentum and in sqrt(J)."""
-COST_RELATIVE, COST_ABSOLUTE = 1e-15, 1e-30
-MOST_ITERATIONS = 100
-LONGEST_STEP = 1.5
-LINE_TOLERANCE = 1e-8
 
 
 @part
@@ -41,12 +48,12 @@ def prepare(tree: Tree, state: State, dt: float, count: int, w: Work) -> None:
     """Free motion v*, the constraints there are and their constants, from M, forces and contacts."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
-    copy_paths(tree.path, w.M, w.H)
-    factor(tree.path, w.H)
+    copy_rows(tree, w.M, w.H)
+    factor_rows(tree, w.H, w.pivot)
     for k in range(tree.path.shape[0]):
         w.v_star[k] = w.force[k]
-        w.scale[k] = 1.0 / math.sqrt(w.M[k, k])
-    solve_factored(tree.path, w.H, w.v_star)
+        w.scale[k] = 1.0 / math.sqrt(w.M[k, tree.depth[k]])
+    solve_rows(tree, w.H, w.pivot, w.v_star)
     for k in range(tree.path.shape[0]):
         w.v_star[k] = state.v[k] + dt * w.v_star[k]
     for g in range(w.active.shape[0]):
@@ -65,7 +72,7 @@ def prepare(tree: Tree, state: State, dt: float, count: int, w: Work) -> None:
 @part
 def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work) -> None:
     """Dry friction and limits of one joint."""
-    near_rigid = NEAR_RIGID / w.M[k, k]
+    near_rigid = NEAR_RIGID / w.M[k, tree.depth[k]]
     if tree.brake[i] > 0.0:
         w.brake_gain[i] = tree.brake_gain[i] if 1.0 / (dt * tree.brake_gain[i]) >= near_rigid else 1.0 / (dt * near_rigid)
         w.active[tree.group[k]] = True
@@ -82,32 +89,27 @@ def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work)
 @part
 def _weight(tree: Tree, c: int, w: Work) -> float:
     """Norm over three of J diag(A)^-1 J' of a contact."""
-    path = tree.row if w.other[c] >= 0 else tree.path
-    total = 0.0
-    for r in range(3):
-        for s in range(r + 1):
-            entry = 0.0
-            j = w.last[c]
-            while j >= 0:
-                entry += w.J[c, r, j] * w.J[c, s, j] * w.scale[j] * w.scale[j]
-                j = path[j]
-            total += entry * entry if r == s else 2.0 * entry * entry
+    of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+    xx = xy = yy = xz = yz = zz = 0.0
+    t = int(deepest(tree, c, w))
+    while True:  # there is at least one
+        x, y, z, scale = w.J[c, 0, t], w.J[c, 1, t], w.J[c, 2, t], w.scale[of[t]]
+        xx += x * x * scale * scale
+        xy += y * x * scale * scale
+        yy += y * y * scale * scale
+        xz += z * x * scale * scale
+        yz += z * y * scale * scale
+        zz += z * z * scale * scale
+        if t == 0:
+            break
+        t -= 1
+    total = xx * xx
+    total += 2.0 * xy * xy
+    total += yy * yy
+    total += 2.0 * xz * xz
+    total += 2.0 * yz * yz
+    total += zz * zz
     return math.sqrt(total) / 3.0
-
-
-@part
-def _limit_impulse(w: Work, i: int, side: int, v: float) -> float:
-    """Of one end of a joint that comes towards it at -v, not negative."""
-    return max((w.limit_v[i, side] - v) / w.limit_R[i], 0.0)
-
-
-@part
-def _normal_impulse(w: Work, c: int, v: float, dt: float) -> tuple[float, float]:
-    """Impulse of a contact at normal velocity v, and minus its slope (Hunt-Crossley, implicit)."""
-    force, damping = w.elastic[c] - dt * w.stiffness[c] * v, 1.0 - w.dissipation[c] * v
-    if force <= 0.0 or damping <= 0.0:
-        return 0.0, 0.0
-    return dt * force * damping, dt * (w.stiffness[c] * dt * damping + w.dissipation[c] * force)
 
 
 @part
@@ -122,9 +124,9 @@ def _gradient(tree: Tree, dt: float, count: int, w: Work) -> tuple[float, float]
         if tree.brake[i] > 0.0:
             w.impulse[o + i] += dt * clamp(-w.brake_gain[i] * v, -tree.brake[i], tree.brake[i])
         if w.limit_on[i, 0]:
-            w.impulse[o + i] += _limit_impulse(w, i, 0, v)
+            w.impulse[o + i] += limit_impulse(w, i, 0, v)
         if w.limit_on[i, 1]:
-            w.impulse[o + i] -= _limit_impulse(w, i, 1, -v)
+            w.impulse[o + i] -= limit_impulse(w, i, 1, -v)
     for c in range(count):
         _push_contact(tree, c, dt, w)
     residual = momentum = impulse = 0.0
@@ -145,109 +147,41 @@ def _push_contact(tree: Tree, c: int, dt: float, w: Work) -> None:
     x, y = w.vc[c, 0], w.vc[c, 1]
     per_speed = w.friction[c] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
     share = 1.0 / (x * x + y * y + w.soft[c] * w.soft[c])
-    normal, slope = _normal_impulse(w, c, w.vc[c, 2], dt)
+    normal, slope = normal_impulse(w, c, w.vc[c, 2], dt)
     w.hessian[c, 0] = per_speed * (1.0 - x * x * share)
     w.hessian[c, 1] = -per_speed * x * y * share
     w.hessian[c, 2] = per_speed * (1.0 - y * y * share)
     w.hessian[c, 3] = slope
-    path = tree.row if w.other[c] >= 0 else tree.path
-    j = w.last[c]
-    while j >= 0:
-        w.impulse[j] += w.J[c, 2, j] * normal - per_speed * (w.J[c, 0, j] * x + w.J[c, 1, j] * y)
-        j = path[j]
-
-
-@part
-def _cost(tree: Tree, dt: float, count: int, alpha: float, w: Work) -> float:
-    """The cost at v + alpha dv."""
-    o = 6 if tree.free else 0
-    cost = 0.0
-    for k in range(tree.path.shape[0]):
-        if w.active[tree.group[k]]:
-            gain = w.momentum[k] - w.momentum_star[k] + alpha * w.dp[k]
-            cost += 0.5 * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k]) * gain
-    for i in range(tree.parent.shape[0]):
-        v = w.v_next[o + i] + alpha * w.dv[o + i]
-        if tree.brake[i] > 0.0:
-            y = abs(w.brake_gain[i] * v)
-            cost += dt / w.brake_gain[i] * (0.5 * y * y if y < tree.brake[i] else tree.brake[i] * (y - 0.5 * tree.brake[i]))
-        if w.limit_on[i, 0]:
-            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 0, v) ** 2
-        if w.limit_on[i, 1]:
-            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 1, -v) ** 2
-    for c in range(count):
-        cost += _contact_cost(c, dt, alpha, w)
-    return cost
-
-
-@part
-def _contact_cost(c: int, dt: float, alpha: float, w: Work) -> float:
-    """Antiderivatives of the impulses: of the normal's, constant from where it has ended, and of lagged friction's."""
-    k, d, elastic = w.stiffness[c], w.dissipation[c], w.elastic[c]
-    x, y, z = w.vc[c, 0] + alpha * w.dvc[c, 0], w.vc[c, 1] + alpha * w.dvc[c, 1], w.vc[c, 2] + alpha * w.dvc[c, 2]
-    z = min(z, elastic / dt / (k + 1e-20), 1.0 / (d + 1e-20))
-    change = -dt * k * z
-    normal = dt * (z * (elastic + 0.5 * change) - 0.5 * d * z * z * (elastic + 2.0 / 3.0 * change))
-    slip = math.sqrt(x * x + y * y + w.soft[c] * w.soft[c]) - w.soft[c]
-    return w.friction[c] * w.normal[c] * slip - normal
-
-
-@part
-def _slope(tree: Tree, dt: float, count: int, alpha: float, curve: float, w: Work) -> tuple[float, float]:
-    """First and second derivative of the cost along dv. curve: dv' A dv."""
-    o = 6 if tree.free else 0
-    first, second = 0.0, curve
-    for k in range(tree.path.shape[0]):
-        first += w.dp[k] * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k])
-    for i in range(tree.parent.shape[0]):
-        dv = w.dv[o + i]
-        v = w.v_next[o + i] + alpha * dv
-        if tree.brake[i] > 0.0:
-            y = -w.brake_gain[i] * v
-            if abs(y) <= tree.brake[i]:
-                second += dt * w.brake_gain[i] * dv * dv
-            first -= dt * clamp(y, -tree.brake[i], tree.brake[i]) * dv
-        if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
-            first -= _limit_impulse(w, i, 0, v) * dv
-            second += dv * dv / w.limit_R[i]
-        if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
-            first += _limit_impulse(w, i, 1, -v) * dv
-            second += dv * dv / w.limit_R[i]
-    for c in range(count):
-        a, b, e = w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2]
-        x, y = w.vc[c, 0] + alpha * a, w.vc[c, 1] + alpha * b
-        size = x * x + y * y + w.soft[c] * w.soft[c]
-        per_speed = w.friction[c] * w.normal[c] / math.sqrt(size)
-        normal, slope = _normal_impulse(w, c, w.vc[c, 2] + alpha * e, dt)
-        first += per_speed * (x * a + y * b) - normal * e
-        second += per_speed * (a * a + b * b - (x * a + y * b) ** 2 / size) + slope * e * e
-    return first, second
+    of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+    for t in range(deepest(tree, c, w), -1, -1):
+        w.impulse[of[t]] += w.J[c, 2, t] * normal - per_speed * (w.J[c, 0, t] * x + w.J[c, 1, t] * y)
 
 
 @part
 def _direction(tree: Tree, dt: float, count: int, w: Work) -> float:
     """w.dv = -H^-1 gradient, w.dp = A dv, w.dvc = J dv; returns dv' A dv."""
     o = 6 if tree.free else 0
-    path = tree.row if w.crossed[0] else tree.path
-    copy_paths(path, w.M, w.H)
+    copy_rows(tree, w.M, w.H)
     for i in range(tree.parent.shape[0]):
-        v = w.v_next[o + i]
+        v, t = w.v_next[o + i], tree.depth[o + i]
         if tree.brake[i] > 0.0 and abs(w.brake_gain[i] * v) <= tree.brake[i]:
-            w.H[o + i, o + i] += dt * w.brake_gain[i]
+            w.H[o + i, t] += dt * w.brake_gain[i]
         if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
-            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
+            w.H[o + i, t] += 1.0 / w.limit_R[i]
         if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
-            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
-    for c in range(count):
-        _stiffen(tree, c, w)
-    factor(path, w.H)
+            w.H[o + i, t] += 1.0 / w.limit_R[i]
     for k in range(tree.path.shape[0]):
         w.dv[k] = -w.gradient[k]
-    solve_factored(path, w.H, w.dv)
-    times_matrix(tree.path, w.M, w.dv, w.dp)
+    if w.crossed[0]:
+        _solve_crossed(tree, count, w)
+    else:
+        for c in range(count):
+            _stiffen(tree, c, w)
+        factor_rows(tree, w.H, w.pivot)
+        solve_rows(tree, w.H, w.pivot, w.dv)
+    times_rows(tree, w.M, w.dv, w.dp)
     for c in range(count):
-        for r in range(3):
-            w.dvc[c, r] = along(tree, c, w.J[c, r], w.dv, w)
+        w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2] = along(tree, c, w.dv, w)
     curve = 0.0
     for k in range(tree.path.shape[0]):
         curve += w.dv[k] * w.dp[k]
@@ -257,56 +191,38 @@ def _direction(tree: Tree, dt: float, count: int, w: Work) -> float:
 @part
 def _stiffen(tree: Tree, c: int, w: Work) -> None:
     """H += J' G J of a contact."""
-    path = tree.row if w.other[c] >= 0 else tree.path
-    j = w.last[c]
-    while j >= 0:
-        x = w.hessian[c, 0] * w.J[c, 0, j] + w.hessian[c, 1] * w.J[c, 1, j]
-        y = w.hessian[c, 1] * w.J[c, 0, j] + w.hessian[c, 2] * w.J[c, 1, j]
-        z = w.hessian[c, 3] * w.J[c, 2, j]
-        i = j
-        while i >= 0:
-            w.H[j, i] += x * w.J[c, 0, i] + y * w.J[c, 1, i] + z * w.J[c, 2, i]
-            i = path[i]
-        j = path[j]
+    deep, J = tree.depth[w.last[c]], w.J[c]
+    for u in range(0, deep + 1, LANES):
+        a, b, d = stretch(J, 0, u), stretch(J, 1, u), stretch(J, 2, u)
+        for t in range(u, deep + 1):
+            x, y, z = _stiffness(c, t, w)
+            j = tree.above[w.last[c], t]
+            put_stretch(w.H, j, u, stretch(w.H, j, u) + (x * a + y * b + z * d))
 
 
 @part
-def _step_length(tree: Tree, dt: float, count: int, curve: float, w: Work) -> float:
-    """Where the cost is least along dv: Newton on its slope, by halves where that is slow (as rtsafe, Press et al. 2007,
-    section 9.4)."""
-    falls = 0.0
-    for k in range(tree.path.shape[0]):
-        falls -= w.gradient[k] * w.dv[k]
-    slope, curvature = _slope(tree, dt, count, LONGEST_STEP, curve, w)
-    if slope <= 0.0:
-        return LONGEST_STEP
-    if falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, dt, count, LONGEST_STEP, w):
-        return 1.0
-    if slope / falls < LINE_TOLERANCE:
-        return LONGEST_STEP
-    guess = min(falls / curvature, LONGEST_STEP)
-    low, high, at = 0.0, LONGEST_STEP, guess
-    change = before = low - high
-    for _ in range(MOST_ITERATIONS):
-        slope, curvature = _slope(tree, dt, count, at, curve, w)
-        slope, curvature = slope / falls, curvature / falls
-        if slope < 0.0:
-            low = at
-        else:
-            high = at
-        if abs(slope) < LINE_TOLERANCE:
-            return at
-        slow = 2.0 * abs(slope) > abs(before * curvature)
-        before = change
-        change = slope / curvature
-        if slow or not low <= at - change <= high:
-            change = 0.5 * (low - high)
-            at = low - change
-        else:
-            at -= change
-        if abs(change) < LINE_TOLERANCE * guess:
-            return at
-    return at
+def _stiffness(c: int, t: int, w: Work) -> Three:
+    """G times column t of a contact's Jacobian."""
+    return (w.hessian[c, 0] * w.J[c, 0, t] + w.hessian[c, 1] * w.J[c, 1, t],
+            w.hessian[c, 1] * w.J[c, 0, t] + w.hessian[c, 2] * w.J[c, 1, t], w.hessian[c, 3] * w.J[c, 2, t])
+
+
+@rare
+def _solve_crossed(tree: Tree, count: int, w: Work) -> None:
+    """w.dv := H^-1 w.dv, where a contact lies between two branches; H is without contacts yet."""
+    for j in range(tree.depth.shape[0]):
+        for i in range(j):
+            w.whole[j, i] = 0.0
+        for t in range(tree.depth[j] + 1):
+            w.whole[j, tree.above[j, t]] = w.H[j, t]
+    for c in range(count):
+        of = tree.number if w.other[c] >= 0 else tree.above[w.last[c]]
+        for t in range(deepest(tree, c, w), -1, -1):
+            x, y, z = _stiffness(c, t, w)
+            for u in range(t + 1):
+                w.whole[of[t], of[u]] += x * w.J[c, 0, u] + y * w.J[c, 1, u] + z * w.J[c, 2, u]
+    factor(tree.number, tree.every, w.whole)
+    solve_factored(tree.number, tree.every, w.whole, w.dv)
 
 
 @part
@@ -317,8 +233,8 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
         anything |= w.active[g]
     if not anything:
         return 0
-    times_matrix(tree.path, w.M, w.v_star, w.momentum_star)
-    times_matrix(tree.path, w.M, w.v_next, w.momentum)
+    times_rows(tree, w.M, w.v_star, w.momentum_star)
+    times_rows(tree, w.M, w.v_next, w.momentum)
     cost = _cost_here(tree, dt, count, w)
     stalled = False
     for iteration in range(MOST_ITERATIONS + 1):
@@ -328,7 +244,7 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
         if iteration == MOST_ITERATIONS or not residual < math.inf:
             break
         curve = _direction(tree, dt, count, w)
-        alpha = _step_length(tree, dt, count, curve, w)
+        alpha = step_length(tree, dt, count, curve, cost, w)
         for k in range(tree.path.shape[0]):
             w.v_next[k] += alpha * w.dv[k]
             w.momentum[k] += alpha * w.dp[k]
@@ -343,4 +259,4 @@ def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
 
 @part
 def _cost_here(tree: Tree, dt: float, count: int, w: Work) -> float:
-    return _cost(tree, dt, count, 0.0, w)
+    return cost_along(tree, dt, count, 0.0, w)

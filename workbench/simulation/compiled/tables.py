@@ -26,6 +26,7 @@ from pydrake.planning import RobotDiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
 from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
+from workbench.simulation.compiled.forest import groups, ways
 from workbench.simulation.contact import SelectFeet
 
 _VISUAL = re.compile(r"<visual\b[^>]*/>|<visual\b[^>]*>.*?</visual>", re.DOTALL)
@@ -165,10 +166,10 @@ class _Reader:
         mass, com, inertia = weigh(links, n)
         stiffness, rest = self._springs()
         tree = Tree(
-            free=self.free, parent=parent, path=path, row=np.arange(-1, len(path) - 1, dtype=np.int64), group=_groups(path), R=R,
-            p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
-            damping=np.array([j.default_damping() for j in self.turning]),
-            stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
+            free=self.free, parent=parent, carrier=np.where(parent >= 0, parent, n).astype(np.uint32), path=path, **ways(path, o),
+            group=groups(path), R=R, p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
+            damping=np.array([j.default_damping() for j in self.turning]), stiffness=stiffness, rest=rest,
+            lower=np.array([j.position_lower_limit() for j in self.turning]),
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
             gravity=np.zeros(3), pull=np.zeros(3))
         return Tables(joints=tuple(j.name() for j in self.turning), tree=tree, X_WBase=self._X_WBase(),
@@ -252,16 +253,6 @@ class _Reader:
 
 def _rows(values: list[Array], *shape: int) -> Array:
     return np.ascontiguousarray(np.array(values, dtype=float).reshape(len(values), *shape))
-
-
-def _groups(path: Ints) -> Ints:
-    """Trees of Drake's forest: velocities with a common end of their paths."""
-    group = np.empty(len(path), np.int64)
-    trees = 0
-    for k, before in enumerate(path):
-        group[k] = trees if before < 0 else group[before]
-        trees += int(before < 0)
-    return group
 
 
 def carried(M: SpatialInertia, X: RigidTransform) -> SpatialInertia:

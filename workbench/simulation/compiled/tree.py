@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from workbench.simulation.compiled.arrays import Array, Ints, State, Tree, Work
+from workbench.simulation.compiled.arrays import Array, Numbers, State, Tree, Work
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.vectors import cross, quat_of, turned, write_rotation
 
@@ -26,7 +26,7 @@ def place_bodies(tree: Tree, state: State, w: Work) -> None:
     for r in range(3):
         w.p[n, r] = 0.0
     for i in range(n):
-        a = tree.parent[i] if tree.parent[i] >= 0 else n
+        a = tree.carrier[i]
         _place_body(tree, i, a, math.cos(state.q[i]), math.sin(state.q[i]), w)
 
 
@@ -66,7 +66,7 @@ def move_bodies(tree: Tree, state: State, w: Work) -> None:
         w.A[n, 4] -= y
         w.A[n, 5] -= z
     for i in range(n):
-        a = tree.parent[i] if tree.parent[i] >= 0 else n
+        a = tree.carrier[i]
         _move_body(tree, i, a, o + i, state.v[o + i], w)
 
 
@@ -138,28 +138,26 @@ def _momentum(m: float, first: Array, I: Array, wx: float, wy: float, wz: float,
 
 @part
 def gather(tree: Tree, state: State, dt: float, w: Work) -> None:
-    """Mass matrix M + dt D with reflected inertia, lower part along each path; adds the negative of gyroscopic forces and
+    """Mass matrix M + dt D with reflected inertia, lower part; adds the negative of gyroscopic forces and
     gravity, and joints' damping and springs, to w.force."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
-    for i in range(n - 1, -1, -1):
+    i = int(n)
+    while i > 0:
+        i -= 1
         k = o + i
-        a = tree.parent[i]
         bias = 0.0
         for j in range(6):
             bias += w.S[k, j] * w.F[i, j]
         w.force[k] += -bias - tree.damping[i] * state.v[k] - tree.stiffness[i] * (state.q[i] - tree.rest[i])
         f0, f1, f2, f3, f4, f5 = _momentum(w.mass[i], w.moment[i], w.inertia[i],
                                            w.S[k, 0], w.S[k, 1], w.S[k, 2], w.S[k, 3], w.S[k, 4], w.S[k, 5])
-        j = k
-        while j >= 0:
-            w.M[k, j] = (w.S[j, 0] * f0 + w.S[j, 1] * f1 + w.S[j, 2] * f2 + w.S[j, 3] * f3 + w.S[j, 4] * f4 + w.S[j, 5] * f5)
-            j = tree.path[j]
-        w.M[k, k] += tree.armature[i] + dt * tree.damping[i]
-        if a < 0:
-            a = n
-        if a < n or tree.free:
-            _add_body(i, a, w)
+        for t in range(tree.depth[k] + 1):
+            j = tree.above[k, t]
+            w.M[k, t] = (w.S[j, 0] * f0 + w.S[j, 1] * f1 + w.S[j, 2] * f2 + w.S[j, 3] * f3 + w.S[j, 4] * f4 + w.S[j, 5] * f5)
+        w.M[k, tree.depth[k]] += tree.armature[i] + dt * tree.damping[i]
+        if tree.carrier[i] < n or tree.free:
+            _add_body(i, tree.carrier[i], w)
     if tree.free:
         _gather_base(tree, n, w)
 
@@ -193,65 +191,52 @@ def _gather_base(tree: Tree, n: int, w: Work) -> None:
 
 
 @part
-def factor(path: Ints, H: Array) -> None:
-    """H = L' L in place, lower parts along each path (Featherstone 2008, table 6.3)."""
-    for k in range(path.shape[0] - 1, -1, -1):
-        d = math.sqrt(H[k, k])
-        H[k, k] = d
+def factor(depth: Numbers, above: Numbers, H: Array) -> None:
+    """H = L' L in place (Featherstone 2008, table 6.3). depth, above: as in `Tree`, or `Tree.number` and `Tree.every`."""
+    for k in range(depth.shape[0] - 1, -1, -1):
+        d = math.sqrt(H[k, depth[k]])
+        H[k, depth[k]] = d
         inverse = 1.0 / d
-        i = path[k]
-        while i >= 0:
-            H[k, i] *= inverse
-            i = path[i]
-        i = path[k]
-        while i >= 0:
-            c = H[k, i]
-            j = i
-            while j >= 0:
-                H[i, j] -= c * H[k, j]
-                j = path[j]
-            i = path[i]
+        for t in range(depth[k]):
+            H[k, t] *= inverse
+        for t in range(depth[k]):
+            c = H[k, t]
+            for u in range(t + 1):
+                H[above[k, t], u] -= c * H[k, u]
 
 
 @part
-def solve_factored(path: Ints, H: Array, x: Array) -> None:
+def solve_factored(depth: Numbers, above: Numbers, H: Array, x: Array) -> None:
     """x := (L' L)^-1 x."""
-    n = path.shape[0]
+    n = depth.shape[0]
     for i in range(n - 1, -1, -1):
-        x[i] /= H[i, i]
-        j = path[i]
-        while j >= 0:
-            x[j] -= H[i, j] * x[i]
-            j = path[j]
+        x[i] /= H[i, depth[i]]
+        for t in range(depth[i]):
+            x[above[i, t]] -= H[i, t] * x[i]
     for i in range(n):
         s = x[i]
-        j = path[i]
-        while j >= 0:
-            s -= H[i, j] * x[j]
-            j = path[j]
-        x[i] = s / H[i, i]
+        for t in range(depth[i] - 1, -1, -1):
+            s -= H[i, t] * x[above[i, t]]
+        x[i] = s / H[i, depth[i]]
 
 
 @part
-def copy_paths(path: Ints, M: Array, H: Array) -> None:
-    """H := M along the paths."""
-    for i in range(path.shape[0]):
-        j = i
-        while j >= 0:
-            H[i, j] = M[i, j]
-            j = path[j]
+def copy_matrix(tree: Tree, M: Array, H: Array) -> None:
+    """H := M."""
+    for i in range(tree.depth.shape[0]):
+        for t in range(tree.depth[i] + 1):
+            H[i, t] = M[i, t]
 
 
 @part
-def times_matrix(path: Ints, M: Array, x: Array, y: Array) -> None:
+def times_matrix(tree: Tree, M: Array, x: Array, y: Array) -> None:
     """y := M x of the symmetric matrix whose lower part M holds along the paths."""
-    n = path.shape[0]
+    n = tree.depth.shape[0]
     for i in range(n):
         y[i] = 0.0
     for i in range(n):
-        y[i] += M[i, i] * x[i]
-        j = path[i]
-        while j >= 0:
-            y[i] += M[i, j] * x[j]
-            y[j] += M[i, j] * x[i]
-            j = path[j]
+        y[i] += M[i, tree.depth[i]] * x[i]
+        for t in range(tree.depth[i] - 1, -1, -1):
+            j = tree.above[i, t]
+            y[i] += M[i, t] * x[j]
+            y[j] += M[i, t] * x[i]

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.simulation.compiled.arrays import Ints, Servos, State, Tree
-from workbench.simulation.compiled.lanes.number import LANES
+from workbench.simulation.compiled.arrays import Numbers, Servos, State, Tree
+from workbench.simulation.compiled.number import LANES
 from workbench.types import Array
 
 
 class LaneServos(NamedTuple):
     """As `Servos`. terms, varies: in any lane; lags: whether any goal does. Of those a lane lacks, a number changes nothing."""
 
-    joint: Ints
+    joint: Numbers
     terms: bool
     varies: bool
     lags: bool

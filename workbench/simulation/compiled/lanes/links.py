@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from workbench.simulation.compiled.arrays import Shapes
 from workbench.simulation.compiled.kernel import part, rare
 from workbench.simulation.compiled.lanes.arrays import Room
-from workbench.simulation.compiled.lanes.number import LANES, Mask, Wide, anywhere, lane, where, wide, with_lane
 from workbench.simulation.compiled.links import outside, shapes_touch
+from workbench.simulation.compiled.number import LANES, Mask, Wide, anywhere, lane, where, wide, with_lane
 from workbench.simulation.compiled.vectors import turned
 from workbench.types import Array
 

@@ -9,9 +9,9 @@ from workbench.simulation.compiled.arrays import Schedule, Shapes, State, Tree
 from workbench.simulation.compiled.kernel import kernel, part
 from workbench.simulation.compiled.lanes.arrays import LaneServos, Lost, Room
 from workbench.simulation.compiled.lanes.links import touching
-from workbench.simulation.compiled.lanes.number import LANES, as_wide, lane, where, wide
 from workbench.simulation.compiled.lanes.servo import advance_servos, command, push_joints, put_servos
 from workbench.simulation.compiled.lanes.solve import prepare, solve
+from workbench.simulation.compiled.number import LANES, as_wide, lane, where, wide
 from workbench.simulation.compiled.tree import gather, move_bodies, place_bodies, weigh_bodies
 from workbench.types import Array
 
@@ -19,9 +19,10 @@ from workbench.types import Array
 @part
 def _wide_tree(t: Tree) -> Tree:
     return Tree(
-        False, t.parent, t.path, t.row, t.group, as_wide(t.R), as_wide(t.p), as_wide(t.axis), as_wide(t.mass), as_wide(t.com),
-        as_wide(t.inertia), as_wide(t.armature), as_wide(t.damping), as_wide(t.stiffness), as_wide(t.rest), as_wide(t.lower),
-        as_wide(t.upper), as_wide(t.brake), as_wide(t.brake_gain), as_wide(t.gravity), t.pull)
+        False, t.parent, t.carrier, t.path, t.depth, t.above, t.number, t.every, t.order, t.forks, t.limbs, t.inner, t.joined,
+        t.group, as_wide(t.R), as_wide(t.p), as_wide(t.axis), as_wide(t.mass), as_wide(t.com), as_wide(t.inertia),
+        as_wide(t.armature), as_wide(t.damping), as_wide(t.stiffness), as_wide(t.rest), as_wide(t.lower), as_wide(t.upper),
+        as_wide(t.brake), as_wide(t.brake_gain), as_wide(t.gravity), t.pull)
 
 
 @part

@@ -11,7 +11,7 @@ from workbench.servo.term_bank import LOAD_SMOOTHING, MOVING
 from workbench.simulation.compiled.arrays import Schedule, State, Tree
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.lanes.arrays import LaneServos, Room
-from workbench.simulation.compiled.lanes.number import Wide, exponential, least, most, where, wide, with_sign, within
+from workbench.simulation.compiled.number import Wide, exponential, least, most, where, wide, with_sign, within
 
 _SMOOTHING, _MOVING = float(LOAD_SMOOTHING), float(MOVING)
 

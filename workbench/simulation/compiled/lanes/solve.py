@@ -9,22 +9,12 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import State, Tree
+from workbench.simulation.compiled.cost import COST_ABSOLUTE, COST_RELATIVE, LINE_TOLERANCE, LONGEST_STEP, MOST_ITERATIONS
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.lanes.arrays import Room
-from workbench.simulation.compiled.lanes.number import Mask, Wide, anywhere, least, most, where, wide, within
-from workbench.simulation.compiled.solve import (
-    ABSOLUTE,
-    COST_ABSOLUTE,
-    COST_RELATIVE,
-    LIMIT_STIFFNESS,
-    LIMIT_WINDOW,
-    LINE_TOLERANCE,
-    LONGEST_STEP,
-    MOST_ITERATIONS,
-    NEAR_RIGID,
-    RELATIVE,
-)
-from workbench.simulation.compiled.tree import copy_paths, factor, solve_factored, times_matrix
+from workbench.simulation.compiled.number import Mask, Wide, anywhere, least, most, where, wide, within
+from workbench.simulation.compiled.solve import ABSOLUTE, LIMIT_STIFFNESS, LIMIT_WINDOW, NEAR_RIGID, RELATIVE
+from workbench.simulation.compiled.tree import copy_matrix, factor, solve_factored, times_matrix
 
 
 @part
@@ -32,18 +22,18 @@ def prepare(tree: Tree, dt: float, state: State, w: Room) -> bool:
     """Free motion v*, and the constants of friction and limits; whether any joint of any lane is near a limit. A limit that is
     far is one that is met at a velocity of minus infinity."""
     n = tree.parent.shape[0]
-    copy_paths(tree.path, w.M, w.H)
-    factor(tree.path, w.H)
+    copy_matrix(tree, w.M, w.H)
+    factor(tree.depth, tree.above, w.H)
     for k in range(n):
         w.v_star[k] = w.force[k]
-        w.scale[k] = 1.0 / math.sqrt(w.M[k, k])
-    solve_factored(tree.path, w.H, w.v_star)
+        w.scale[k] = 1.0 / math.sqrt(w.M[k, tree.depth[k]])
+    solve_factored(tree.depth, tree.above, w.H, w.v_star)
     for g in range(w.active.shape[0]):
         w.active[g] = 0.0
     near_any = wide(0.0)
     for k in range(n):
         w.v_star[k] = state.v[k] + dt * w.v_star[k]
-        near_rigid = NEAR_RIGID / w.M[k, k]
+        near_rigid = NEAR_RIGID / w.M[k, tree.depth[k]]
         w.brake_gain[k] = where(1.0 / (dt * tree.brake_gain[k]) >= near_rigid, tree.brake_gain[k], 1.0 / (dt * near_rigid))
         window = LIMIT_WINDOW * dt * most(abs(state.v[k]), abs(w.v_star[k]))
         low, high = tree.lower[k] >= state.q[k] - window, tree.upper[k] <= state.q[k] + window
@@ -120,17 +110,17 @@ def _slope(tree: Tree, dt: float, limits: bool, alpha: Wide, curve: Wide, w: Roo
 @part
 def _direction(tree: Tree, dt: float, limits: bool, w: Room) -> Wide:
     n = tree.parent.shape[0]
-    copy_paths(tree.path, w.M, w.H)
+    copy_matrix(tree, w.M, w.H)
     for k in range(n):
         v = w.v_next[k]
-        w.H[k, k] += where(abs(w.brake_gain[k] * v) <= tree.brake[k], dt * w.brake_gain[k], 0.0)
+        w.H[k, tree.depth[k]] += where(abs(w.brake_gain[k] * v) <= tree.brake[k], dt * w.brake_gain[k], 0.0)
         if limits:
-            w.H[k, k] += where(w.limit_v[k, 0] - v > 0.0, 1.0 / w.limit_R[k], 0.0)
-            w.H[k, k] += where(w.limit_v[k, 1] + v > 0.0, 1.0 / w.limit_R[k], 0.0)
+            w.H[k, tree.depth[k]] += where(w.limit_v[k, 0] - v > 0.0, 1.0 / w.limit_R[k], 0.0)
+            w.H[k, tree.depth[k]] += where(w.limit_v[k, 1] + v > 0.0, 1.0 / w.limit_R[k], 0.0)
         w.dv[k] = -w.gradient[k]
-    factor(tree.path, w.H)
-    solve_factored(tree.path, w.H, w.dv)
-    times_matrix(tree.path, w.M, w.dv, w.dp)
+    factor(tree.depth, tree.above, w.H)
+    solve_factored(tree.depth, tree.above, w.H, w.dv)
+    times_matrix(tree, w.M, w.dv, w.dp)
     curve = wide(0.0)
     for k in range(n):
         curve += w.dv[k] * w.dp[k]
@@ -177,8 +167,8 @@ def solve(tree: Tree, dt: float, limits: bool, gone: Mask, w: Room) -> Mask:
     """From w.v_next, the guess, to the velocities at the step's end. limits: whether any is near. gone: lanes that no
     longer matter; returned with those that did not converge."""
     n = tree.parent.shape[0]
-    times_matrix(tree.path, w.M, w.v_star, w.momentum_star)
-    times_matrix(tree.path, w.M, w.v_next, w.momentum)
+    times_matrix(tree, w.M, w.v_star, w.momentum_star)
+    times_matrix(tree, w.M, w.v_next, w.momentum)
     for k in range(n):
         w.dv[k] = 0.0
         w.dp[k] = 0.0

@@ -19,8 +19,8 @@ from workbench.simulation.compiled.lanes.arrays import (
     states_in_lanes,
     trees_in_lanes,
 )
-from workbench.simulation.compiled.lanes.number import LANES
 from workbench.simulation.compiled.lanes.play import play_lanes
+from workbench.simulation.compiled.number import LANES
 from workbench.simulation.compiled.schedule import settling
 from workbench.simulation.compiled.station import CompiledJob, announced
 from workbench.simulation.compiled.tables import NotCoveredError

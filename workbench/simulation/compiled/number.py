@@ -1,4 +1,5 @@
 """Numbers of LANES robots at once, for kernels: vectors of the processor, an entry (a lane) for each robot, and masks of lanes.
+The kernel of one robot takes as many numbers of a matrix's row at once.
 
 Arithmetic, comparisons, abs, sqrt, sin and cos of such numbers are element by element, so that a part of a kernel which does not
 branch on numbers compiles for them unchanged. What branches is written with `where`. An operation rounds in a lane as it does
@@ -20,9 +21,10 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, models, overload, register_model
 from numba.np.arrayobj import populate_array
 
+from workbench.simulation.compiled.arrays import ROW
 from workbench.simulation.compiled.kernel import part
 
-LANES = 8
+LANES = ROW
 """Robots at once: two registers of AVX2, whose operations then overlap, or one of AVX-512. Where vectors are narrower, LLVM takes
 more of them; where there are none, it computes one lane after the other, and nothing is gained."""
 Wide = Any
@@ -199,6 +201,30 @@ def as_wide(typing: Any, array: Any) -> Any:
                        itemsize=ir.Constant(ir.IntType(64), 8 * LANES), meminfo=None)
         return made._getvalue()
     return out(array), lowered
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, i: Any, t: Any) -> Any:
+    """Where entry t of row i of an array is, as that of a wide number."""
+    a = context.make_array(kind)(context, builder, array)
+    at = builder.add(builder.mul(i, cgutils.unpack_tuple(builder, a.shape)[1]), t)
+    return builder.bitcast(builder.gep(a.data, [at]), ir.PointerType(_WIDE))
+
+
+@intrinsic
+def stretch(typing: Any, array: Any, i: Any, t: Any) -> Any:
+    """Entries t to t + LANES - 1 of row i of an array (n, m) of float64, C-contiguous, as one wide number."""
+    def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_place(context, builder, sig.args[0], *args), align=8)
+    return WIDE(array, types.int64, types.int64), lowered
+
+
+@intrinsic
+def put_stretch(typing: Any, array: Any, i: Any, t: Any, x: Any) -> Any:
+    """Writes these entries."""
+    def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[3], _place(context, builder, sig.args[0], *args[:3]), align=8)
+        return context.get_dummy_value()
+    return types.void(array, types.int64, types.int64, WIDE), lowered
 
 
 @part
