@@ -22,10 +22,11 @@ from workbench.simulation.batch import Job, simulate_batch
 
 NAME = "diagnose_time"
 MEANING = "processor seconds of one diagnosis on one process: an arm of three joints, one log, one joint with more dry friction"
-READING, RACE = "reading, registering, floors of the nominal robot", "screening, and all chosen fitted together"
+READING, SEARCH = "reading, registering, floors of the nominal robot", "search"
 EXPERIMENT = "next experiment"
-STAGES = (("reading", READING), ("simulating", READING), ("registering", READING), ("fitting together", "fits together"),
-          ("explaining", RACE), ("rivals", "rivals"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))
+STAGES = (("reading", READING), ("simulating", READING), ("registering", READING), ("judging", READING),
+          ("the nominal law", SEARCH), ("effects", SEARCH), ("takes kept back", SEARCH), ("names that are tied", "ties"),
+          ("an unnamed torque", "unnamed torque"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))
 """How each progress message of `diagnose_session` begins, and the stage it belongs to."""
 REPEATS = 3
 
@@ -71,7 +72,8 @@ def diagnose_time(duration: float | None, seed: int) -> Figure:
     details = {
         "log_seconds": duration, "n_jobs": 1, "wall_seconds": wall, "seconds_by_stage": seconds,
         "share_by_stage": {stage: s / total for stage, s in seconds.items()}, "rollouts": rollouts,
-        "found": [f"{e.effect}({', '.join(e.where)})" for e in diagnosed.model.effects], "one_rollout": one,
+        "found": [f"{f.effect}({', '.join(f.where)})" for f in diagnosed.findings],
+        "recalibrated": [f"{r.number}({', '.join(r.where)})" for r in diagnosed.recalibrated], "one_rollout": one,
         "share_of_so_many_such_rollouts": rollouts * (one["building_seconds"] + one["seconds"]) / total,
         "limits": "rollouts: of the search, most at the step given, some twice as coarse, the last at a quarter of it; the "
                   "nominal robot's three and those of a next experiment are not counted. Candidates differ in the model, so that "

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import drives, engine
 from benchmarks.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
 from benchmarks.bare_plant import BarePlant
-from benchmarks.diagnose_time import RACE, READING, Stages, diagnose_time
+from benchmarks.diagnose_time import READING, SEARCH, Stages, diagnose_time
 from benchmarks.figure import Figure, in_turns, median_and_quartiles
 from benchmarks.sysid import fit_against_mujoco_sysid
 from tests.command import refused, succeeds
@@ -151,10 +151,11 @@ def test_the_arms_log_begins_at_rest_and_tells_its_goals(tmp_path: Path) -> None
 def test_stages_sum_up_what_is_said() -> None:
     ticks = iter([0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0])
     stages = Stages(lambda: next(ticks))
-    for what, done in (("reading recordings", None), ("explaining two (1)", 0.0), ("explaining two (1)", 0.0),
-                       ("explaining two (1)", 0.5), ("explaining two (1)", 0.0), ("rivals of a", 0.0), ("coulomb or load", 0.1)):
+    for what, done in (("reading recordings", None), ("the nominal law recalibrated", 0.0),
+                       ("effects, exploring, level 1", 0.0), ("effects, exploring, level 2", 0.5), ("takes kept back", 0.0),
+                       ("names that are tied", 0.0), ("coulomb or load", 0.1)):
         stages(what, done)
-    assert stages.ended() == {READING: 3.0, RACE: 3.0 + 4.0 + 5.0 + 6.0, "rivals": 7.0, "next experiment": 8.0}
+    assert stages.ended() == {READING: 3.0, SEARCH: 3.0 + 4.0 + 5.0 + 6.0, "ties": 7.0, "next experiment": 8.0}
 
 
 def test_a_diagnosis_is_not_for_the_quick_form() -> None:
