@@ -8,7 +8,7 @@ import pytest
 
 from workbench.robot import data_file, puppy_model
 
-SLOW = ("matplotlib", "numba", "scipy.signal", "scipy.integrate", "joblib")
+SLOW = ("matplotlib", "numba", "scipy", "joblib")
 """Packages that take tenths of a second to import."""
 LOADED = "import sys; from workbench.cli.main import main; main(sys.argv[1:]); print('loaded', *sys.modules)"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from workbench.compare.options import COMPARE
 from workbench.recording.take import Take
@@ -63,6 +62,8 @@ def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
     assert take.quat_WB is not None
     seen = np.isfinite(take.p_WB).all(axis=1) & np.isfinite(take.quat_WB).all(axis=1)
     z_axis = np.full((len(take), 3), np.nan)  # the world's up in the base link's frame
+    from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
     z_axis[seen] = Rotation.from_quat(take.quat_WB[seen], scalar_first=True).as_matrix()[:, 2, :]
     kinematics = model.kinematics
     poses = kinematics.forward(take.q, take.joints)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from workbench.compare.options import COMPARE, SPARC
 from workbench.types import Array, Mask
@@ -94,6 +93,8 @@ def heading(quat_WB: Array) -> Array:
     out = np.full(len(quat_WB), np.nan)
     seen = np.isfinite(quat_WB).all(axis=1)
     if seen.any():
+        from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
         x = Rotation.from_quat(quat_WB[seen], scalar_first=True).as_matrix()[:, :, 0]
         out[seen] = np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
     return out

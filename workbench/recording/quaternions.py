@@ -6,7 +6,6 @@ Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; operation
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from workbench.types import Array
 
@@ -54,6 +53,8 @@ def from_matrix(R: Array) -> Array:
 def interpolate(time: Array, q: Array, at: Array) -> Array:
     """Rotations (M, 4) at times `at` (M,) within `time` (N,), increasing, by the shortest turn at an even rate between
     neighbours of q (N, 4) (slerp)."""
+    from scipy.spatial.transform import Rotation, Slerp  # takes a quarter of a second to import, and logs need none of it
+
     return np.asarray(Slerp(time, Rotation.from_quat(q, scalar_first=True))(at).as_quat(scalar_first=True))
 
 

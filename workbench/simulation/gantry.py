@@ -8,7 +8,6 @@ from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, Prisma
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
-from scipy.spatial.transform import Rotation
 
 GAINS = PdControllerGains(p=1e6, d=1e4)
 """Stiffness [N/m, N m/rad]: the weight of a 2 kg robot deflects it by 20 micrometres."""
@@ -42,10 +41,14 @@ def ConnectPath(builder: RobotDiagramBuilder) -> None:
 def gantry_coordinates(p_WB: NDArray[np.float64], quat_WB: NDArray[np.float64]) -> NDArray[np.float64]:
     """Base poses (N, 3) [m], (N, 4) wxyz as gantry coordinates (N, 6): x, y, z [m], yaw, pitch, roll [rad]; continuous in
     yaw and roll."""
+    from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
     angles = np.unwrap(Rotation.from_quat(quat_WB, scalar_first=True).as_euler("ZYX"), axis=0)
     return np.hstack([p_WB, angles])
 
 
 def base_poses(coordinates: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The inverse: p_WB (N, 3), quat_WB (N, 4) wxyz."""
+    from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
     return coordinates[:, :3], Rotation.from_euler("ZYX", coordinates[:, 3:]).as_quat(scalar_first=True)

@@ -11,7 +11,6 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
-from scipy.spatial.transform import Rotation
 
 from workbench.effects.apply import apply_to_commands, physics_of
 from workbench.files import InputError
@@ -304,6 +303,8 @@ class Simulation:
                 self._command(start.reference - self._zero, np.zeros(len(self.joints)), np.ones(len(self.joints)))
 
     def _put_base(self, base: BaseState) -> None:
+        from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
         R_WB = Rotation.from_quat(np.asarray(base.quat_WB, dtype=float), scalar_first=True).as_matrix()
         self.plant.SetFloatingBaseBodyPoseInWorldFrame(
             self._plant_context, self._base, RigidTransform(RotationMatrix(R_WB), np.asarray(base.p_WB, dtype=float)))

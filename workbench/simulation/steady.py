@@ -8,6 +8,7 @@ base gets the recorded pose and velocity at given instants, and the joints, whic
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import GeometryId, SceneGraph, SceneGraphInspector, Sphere
@@ -16,9 +17,11 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
-from scipy.spatial.transform import Rotation
 
 from workbench.types import Array
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 BESIDE = np.deg2rad(0.5)
 """Between simulated and recorded tilt of the base [rad], where half of it is taken away: noise of cameras leaves nearly all of
@@ -55,6 +58,8 @@ class BaseSetter:
 
     def __init__(self, states: BaseStates, plant: MultibodyPlant, scene_graph: SceneGraph, base: RigidBody, plant_context: Context
                  ) -> None:
+        from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
         self.states = states
         self._plant, self._base, self._context = plant, base, plant_context
         inspector = scene_graph.model_inspector()
@@ -66,6 +71,8 @@ class BaseSetter:
 
     def put(self, k: int, time: float) -> None:
         """Puts the base into state number k, at a time [s] of the run."""
+        from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
         states = self.states
         X_WB = self._plant.GetFreeBodyPose(self._context, self._base)
         V_WB = self._base.EvalSpatialVelocityInWorld(self._context)
@@ -86,6 +93,8 @@ class BaseSetter:
     def in_one_piece(self, time: Array, p_WB: Array, quat_WB: Array) -> tuple[Array, Array]:
         """A path (N, 3), (N, 4) at run times (N,) with the jumps of heading removed: the gain of the robot is measured from its
         position, and may extend across a jump."""
+        from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
         p, R = np.array(p_WB), Rotation.from_quat(np.array(quat_WB), scalar_first=True)
         for at, where, turn in reversed(self._turned):
             later = time > at + 1e-9

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -41,6 +40,8 @@ def lagged_reference(commands: Commands) -> Take:
     keep = np.exp(-_LAG * 1e-3)
     recursion = np.array([np.ones(len(time)), np.full(len(time), -keep)])  # q[k] - keep q[k-1] is the new share of the goal
     q = commands.reference(time)
+    from scipy.linalg import solve_banded  # slow to import, and for captures alone
+
     for _ in range(2):
         q = np.asarray(solve_banded((1, 0), recursion, (1 - keep) * q))
     return Take(name="reference", source="reference", time=time, joints=commands.joints, q=q, starts_at=0.0,

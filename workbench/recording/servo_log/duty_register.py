@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from workbench.types import Array, Mask
 
@@ -134,6 +133,8 @@ def law_of(logs: Sequence[RegisterLog], c: RegisterChecks = REGISTER) -> Registe
     begins.sort(key=lambda x: float(np.log1p(residuals(x) ** 2).sum()))
     def slopes_of(x: Array) -> Array:
         return _differences(residuals, x, scale)
+
+    from scipy.optimize import least_squares  # for logs with such a register alone
 
     fits = [least_squares(residuals, x, jac=slopes_of, bounds=(low, high), loss="cauchy", x_scale=scale) for x in begins[:2]]
     fit = min(fits, key=lambda f: float(f.cost))
