@@ -8,10 +8,10 @@ distance d means that it ends d·h/2 off its line. So the heading is taken as 0 
 by that much within a cycle).
 
 Each effect that could act is applied at sizes that occur on such robots, singly, and the best kinds in pairs. The score is the
-squared distance of end position and heading from these, in units of sigma = sqrt(floor² + published sd²); a variant's floor is
-its change when the step of 1 ms is halved, at least the median of all. Variants within 4 of the best cannot be told apart by this
-measurement.
-For those the study also simulates the same motion on a stand (base held), and states how far the joint angles are from nominal.
+squared distance of end position and heading from these, in units of sigma = sqrt(floor² + published sd²). A variant's numerical
+floor is its change when the step of 1 ms is halved, or the median change of all variants if that is larger. Variants within 4 of
+the best cannot be told apart by this measurement. For those the study also simulates the same motion on a stand (base held), and
+states how far the joint angles are from nominal.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def floor_of(found: Sequence[Outcome]) -> NDArray[np.float64]:
 
 
 def scored(found: Sequence[Outcome], floor: NDArray[np.float64]) -> list[Outcome]:
-    """With their scores, the best first: by the finer step. floor: least one; that of a variant is its own change, if larger."""
+    """With their scores, the best first: by the finer step. floor: minimum; a variant's own change with the step, if larger."""
     sigmas = [np.hypot(np.maximum(floor, np.abs(o.end - o.finer)), PUBLISHED_SD) for o in found]
     return sorted((replace(o, score=float(np.sum(((o.finer - PUBLISHED) / sigma) ** 2))) for o, sigma in zip(found, sigmas)),
                   key=lambda o: o.score)

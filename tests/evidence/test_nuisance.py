@@ -152,7 +152,7 @@ def test_what_vanishes_at_infinity_is_at_no_end(tmp_path):
 
 
 def test_ends_that_registers_set_refute_nothing():
-    """Half of what the pool lets it is where a register held it."""
+    """The register limits the gain to half of its plausible range."""
     gain = replace(candidate("servo_gain"), reach=0.4)
     held = replace(gain, reach=0.2)
     h = start(()).with_effect(held, held.bounds()[1])

@@ -1,4 +1,4 @@
-"""Priors and ends of an effect's size by what one servo in a hundred passes."""
+"""Priors and limits of effect sizes, from the size that one servo in a hundred exceeds."""
 
 import numpy as np
 import pytest

@@ -140,8 +140,7 @@ def test_a_name_far_behind_is_in_the_table_and_not_in_the_sentence():
 
 
 def turned_by(names, alike):
-    """The tie of a rig on which gravity is turned, and which is explained by the first of `names`; `alike`: those that all do
-    the same."""
+    """The tie of a rig on which gravity is turned; the first of `names` explains it. alike: names with identical responses."""
     pool = [candidate(name) for name in names]
     here = replace(region(pool), numbers=(Uncertain(JOINT, "torque_at_full_duty", 0.06),))
     torque, turned, other = np.random.default_rng(3).normal(size=(3, 1600)) * 0.1

@@ -1,4 +1,4 @@
-"""What a verb that plays nothing loads: seconds of imports would be most of its time."""
+"""Modules that a command without a simulation loads: importing everything would take most of its time."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Rollouts are remembered: in memory within bounds, on disk so that a killed run goes on, of servo logs as of filmed takes."""
+"""Rollouts are remembered: in memory within bounds, on disk so that a killed run continues, for servo logs and filmed takes alike."""
 
 from dataclasses import replace
 

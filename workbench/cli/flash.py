@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _build(args: argparse.Namespace, profile: LoaderProfile, folder: Path) -> Program:
-    """The program with the motion, checked; it tells what it is."""
+    """Builds the program with the checked motion, and prints its key data and warnings."""
     from workbench.cli.progress import Progress
     from workbench.device.controller.program import build_program
     from workbench.motion import load_motion

@@ -28,7 +28,7 @@ def corrected_problems(problems: Sequence[str]) -> list[str]:
 
 
 def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:
-    """The servo law of each joint, read from the duty register of all logs, if they have one."""
+    """The servo law of each joint, fitted to the duty registers of its logs; joints without such a register are left out."""
     logs: dict[str, list[RegisterLog]] = {}
     for t in takes:
         channels = t.recording.channels

@@ -58,7 +58,7 @@ class TakeSpec:
 
 @dataclass(frozen=True)
 class PredictSpec:
-    """What is to be predicted: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+    """A take to be predicted: a captured one (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
 
     name: str
     motion: Path | None = None

@@ -144,8 +144,8 @@ def _check_stands(path: Path, recording: Recording, model: RobotModel) -> None:
     moving, seen = moving_at_start(recording, model, FILES.first_frames, FILES.moves_at_once)
     if seen and len(moving) >= FILES.share_moving * seen:
         names = ", ".join(moving[:3]) + (", …" if moving[3:] else "")
-        raise InputError(path, f"the robot moves when the recording begins ({names}); expected it to stand in its neutral pose "
-                               "before the first command, as its angles count from there")
+        raise InputError(path, f"the robot moves when the recording begins ({names}); expected its neutral pose "
+                               "before the first command, from which its angles are measured")
 
 
 def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) -> LeftOut:
