@@ -1,4 +1,4 @@
-"""Rollouts are remembered: in memory within bounds, on disk so that a killed run continues, for servo logs and filmed takes alike."""
+"""Rollouts are remembered: in memory within bounds, on disk so that a killed run continues; of servo logs and filmed takes."""
 
 from dataclasses import replace
 

@@ -58,12 +58,12 @@ def force_phases(take: Take) -> dict[str, FootPhases]:
 
 def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
     """Height of each foot's lowest point in the world (N,) [m]; NaN where its leg or the base was not seen."""
+    from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
+
     assert take.p_WB is not None
     assert take.quat_WB is not None
     seen = np.isfinite(take.p_WB).all(axis=1) & np.isfinite(take.quat_WB).all(axis=1)
     z_axis = np.full((len(take), 3), np.nan)  # the world's up in the base link's frame
-    from scipy.spatial.transform import Rotation  # slow to import, and not needed to read a log
-
     z_axis[seen] = Rotation.from_quat(take.quat_WB[seen], scalar_first=True).as_matrix()[:, 2, :]
     kinematics = model.kinematics
     poses = kinematics.forward(take.q, take.joints)

@@ -57,17 +57,9 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
     return out
 
 
-def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
-    """Every extension at some sizes, with the predicted gain at its best one; the best first."""
-    asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
-    left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
-    along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
-    return best_of_each([_best_along(region, options, f, probes) for probes in along])
-
-
 def akin(region: Region, options: EvidenceOptions, h: Hypothesis) -> list[list[Hypothesis]]:
-    """The hypothesis with one of its effects exchanged for one that acts like it, of its family or tied with it, or with one more
-    option of an effect, at several sizes. Not with a vector, of which no size is typical."""
+    """Each hypothesis that differs from this one in one effect of the same kind, at several sizes: an effect is exchanged for
+    another of its family or tie, or gets one more option. Effects with a vector are left out, as it has no typical direction."""
     made: list[tuple[Hypothesis, Candidate]] = []
     for gone in h.effects:
         kinds, rest = {gone.effect.family, gone.effect.tied} - {None}, h.without(lambda c, gone=gone: c is gone)
@@ -75,6 +67,14 @@ def akin(region: Region, options: EvidenceOptions, h: Hypothesis) -> list[list[H
                  if c.name != gone.name and kinds & {c.effect.family, c.effect.tied} and not c.of_vector.any() and not c.read_off]
     made += [(h, c) for c in extensions(region, h) if c.key in {own.key for own in h.effects}]
     return [[rest.with_effect(c, np.where(c.shapes, 0.0, share)) for share in options.sizes] for rest, c in made]
+
+
+def linearise(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+    """Every extension at some sizes, with the predicted gain at its best one; the best first."""
+    asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
+    left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
+    along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
+    return best_of_each([_best_along(region, options, f, probes) for probes in along])
 
 
 def linearised_around(region: Region, options: EvidenceOptions, h: Hypothesis) -> Asks[tuple[Fitted, list[Move]]]:

@@ -17,8 +17,8 @@ from workbench.types import Array
 
 
 def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Reason]:
-    """The effects of which a number went as far as this robot lets it; one that only shapes an effect has no such end, as
-    `Effect.reach` says nothing of it. pool: as `candidates` made them, with `Effect.reach` and not with what registers say."""
+    """The effects of which a number went to the end of its plausible range on this robot. `Effect.reach` sets no range for
+    numbers that only shape an effect. pool: as `candidates` made them, with `Effect.reach` and not with what registers say."""
     reaches, out = {c.key: c.reach for c in pool}, dict[Candidate, Reason]()
     for c, x in h.sizes():
         far = CONCLUSIONS.at_its_end * reaches.get(c.key, math.inf)

@@ -61,6 +61,10 @@ class Found:
         best = self.best.hypothesis
         return best.key not in self.extended and len(best.effects) < options.most
 
+    def is_near(self, f: Fitted, options: EvidenceOptions) -> bool:
+        """Whether another fit of its model could still make it the likeliest."""
+        return f.log_posterior > self.best.log_posterior - 3 * options.occam
+
     def beam(self, options: EvidenceOptions) -> list[Fitted]:
         """The most probable fits, few enough to continue with."""
         return sorted(self.fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
@@ -75,8 +79,8 @@ def recalibrate_nominal(rollouts: Rollouts, options: EvidenceOptions, report: Pr
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
     rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
-    first = _all_of(rollouts, [_begin(r, options) for r in rollouts.regions])
-    found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
+    first = lockstep(rollouts, {i: _begin(r, options) for i, r in enumerate(rollouts.regions)})
+    found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in (first[i] for i in range(len(first))))
     return with_best(rollouts, found), found
 
 
@@ -156,9 +160,8 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """If the best fit cannot be extended to a better one: drops each of its effects in turn, fitted from the current parameters,
-    so that a poorly converged smaller model does not justify an extra effect; exchanges each for others; and fits the best anew,
-    and those that differ from them in one effect of the same kind: what a ceiling of the torque explains is hardly predicted of
-    a saturation, but fitted."""
+    so that a poorly converged smaller model does not justify an extra effect; exchanges each for others; and fits the models of
+    `_starts_again` from other starting points."""
     if found.best.hypothesis.key not in found.extended:
         return found
     best, region = found.best, found.region
@@ -166,16 +169,23 @@ def _exchange(found: Found, options: EvidenceOptions) -> Asks[Found]:
     made = yield from side_by_side([fit_hypothesis(region, options, h, best.discrepancy, options.iterations, None, J)
                                     for h, J in states])
     fits = with_better(found.fits, made)
-    again: dict[Key, list[Hypothesis]] = {}
-    near = [f.hypothesis for f in found.beam(options) if f.log_posterior > best.log_posterior - 3 * options.occam]
-    for starts in (*akin(region, options, best.hypothesis),
-                   *([at_typical_sizes(h, share) for share in options.sizes] for h in near)):
-        if starts[0].effects and starts[0].key not in found.restarted:
-            again.setdefault(starts[0].key, []).extend(starts)
+    again = _starts_again(found, options)
     made = yield from restart(region, options, list(again.values()), best)
     fits = with_better(fits, [*made, *(reduce(region, options, f) for f in made)])
     found = replace(found, fits=fits, restarted=found.restarted | frozenset(again))
     return (yield from _extend(found, options, [fits[h.key] for h, _ in states], options.beam))
+
+
+def _starts_again(found: Found, options: EvidenceOptions) -> dict[Key, list[Hypothesis]]:
+    """Starting points, by set of effects, of the best models from typical sizes, and of those that differ from the best in one
+    effect of the same kind: linear predictions hardly find a saturation where a ceiling was fitted. Each model only once."""
+    near = [f.hypothesis for f in found.beam(options) if found.is_near(f, options)]
+    again: dict[Key, list[Hypothesis]] = {}
+    for starts in (*akin(found.region, options, found.best.hypothesis),
+                   *([at_typical_sizes(h, share) for share in options.sizes] for h in near)):
+        if starts[0].effects and starts[0].key not in found.restarted:
+            again.setdefault(starts[0].key, []).extend(starts)
+    return again
 
 
 def _extend(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
@@ -236,7 +246,7 @@ def _fit_move(region: Region, options: EvidenceOptions, f: Fitted, m: Move, publ
 def _renew_correlation(found: Found, options: EvidenceOptions, exploring: bool, again: bool) -> Asks[Found]:
     """The fits judged by the correlation time of the closest residuals: the median of a few, as a single estimate is poor.
     again: rolled out again, because other regions have changed, or the step has."""
-    near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
+    near = [f for f in found.fits.values() if exploring or found.is_near(f, options)]
     left = [f.r for f in near]
     if again:
         left = yield [f.hypothesis for f in near]
@@ -250,8 +260,8 @@ def _renew_correlation(found: Found, options: EvidenceOptions, exploring: bool, 
 def _refit(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """The most probable fits continued, and repeated from the nominal law, at the finer step and the new correlation time:
     otherwise fits that have not converged there would be compared with fits that have."""
-    region, least = found.region, found.best.log_posterior - 3 * options.occam
-    near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if f.log_posterior > least][:options.refined]
+    region = found.region
+    near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if found.is_near(f, options)][:options.refined]
     made = yield from side_by_side([
         *(polish(region, options, f) for f in near),
         *(fit_hypothesis(region, options, as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
@@ -267,11 +277,6 @@ def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) ->
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
     """Results of generators of several regions, whose rollouts are shared."""
     return together(dict(parts), lambda wanted: rollouts.answers([(i, h) for i, h in wanted]))
-
-
-def _all_of(rollouts: Rollouts, parts: Sequence[Generator[Any, Any, Any]]) -> list[Any]:
-    done = lockstep(rollouts, dict(enumerate(parts)))
-    return [done[i] for i in range(len(parts))]
 
 
 def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candidate]) -> Asks[Found]:

@@ -27,8 +27,8 @@ def as_published(h: Hypothesis) -> Hypothesis:
 
 
 def at_typical_sizes(h: Hypothesis, share: float) -> Hypothesis:
-    """The nominal law as published with every effect at a share of its typical size, with its sign; vectors and sizes that were
-    read off keep theirs, and numbers that only shape an effect are typical."""
+    """The nominal law as published, with every effect at a share of its typical size, of the same sign as before. Vectors, and
+    sizes that were read off, stay as they are; numbers that only shape an effect are typical."""
     theta = [np.zeros(len(h.numbers))]
     for c, x in h.sizes():
         kept = c.of_vector | c.read_off
@@ -44,7 +44,7 @@ def fit_from_starts(region: Region, options: EvidenceOptions, starts: Sequence[H
 
 
 def restart(region: Region, options: EvidenceOptions, starts: Sequence[Sequence[Hypothesis]], best: Fitted) -> Asks[list[Fitted]]:
-    """The likeliest fit from several starts of each of some models; those that come near the best fit are continued."""
+    """The likeliest fit of each model from its starting points; those that come near the best fit are continued."""
     fits = yield from side_by_side([
         side_by_side([fit_hypothesis(region, options, h, best.discrepancy, options.iterations) for h in of_one])
         for of_one in starts])
