@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from workbench.cache import Cache
 from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
-from workbench.effects.schedules import delay_commands
+from workbench.effects.schedules import delay_commands, delay_each
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
@@ -150,13 +151,19 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
     return np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=np.int64)
 
 
-def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
+def apply_to_commands(commands: Commands, model: RobotModel, until: float = math.inf) -> Commands:
     """The commands on which the servos act: those that were sent, with goals delayed according to the nominal law, and changed by
-    effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off."""
+    effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off. until [s]: what
+    comes later matters to nobody, and is left out where no effect may bring it forward."""
+    changes = [each for each in resolve(model) if type(each[0]).commands is not Effect.commands]
+    commands = commands if changes else commands.until(until)
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
-    for delay in np.unique(late[late > 0]).tolist():
-        commands = delay_commands(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
-    for effect, spec, values in resolve(model):
+    delays = np.unique(late[late > 0]).tolist()
+    if len(delays) == 1:
+        commands = delay_commands(commands, np.flatnonzero(late == delays[0]).tolist(), delays[0], switched=False)
+    elif delays:
+        commands = delay_each(commands, late)
+    for effect, spec, values in changes:
         commands = effect.commands(commands, spec.where, values, model)
     return commands
 

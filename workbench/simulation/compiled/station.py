@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
@@ -122,7 +123,8 @@ class CompiledJob:
     def _plan(self) -> _Plan:
         job = self.job
         sent = None if job.commands is None else job.commands.reordered(self.model.joints)
-        commands = apply_to_commands(sent, self.model) if sent is not None and self.physics.retimed else sent
+        until = math.inf if job.duration is None else job.duration
+        commands = apply_to_commands(sent, self.model, until) if sent is not None and self.physics.retimed else sent
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")
