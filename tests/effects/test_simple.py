@@ -136,6 +136,14 @@ def test_servos_that_hear_their_goals_at_different_times_do_as_if_delayed_one_by
     assert at_once.end == pytest.approx(0.6 + max(late))
 
 
+def test_what_is_sent_after_the_end_of_a_run_is_not_delayed(commands):
+    whole, needed = (delay_each(commands, np.array([0.018, 0.0213]), until) for until in (np.inf, 0.3))
+    heard = needed.times < 0.3
+    assert 0 < len(needed.times) < len(whole.times)
+    np.testing.assert_array_equal(needed.times[heard], whole.times[:heard.sum()])
+    np.testing.assert_array_equal(needed.goals[heard], whole.goals[:heard.sum()])
+
+
 def test_one_joint_may_be_later_than_all_are(commands):
     """Instants that differ only by rounding are one: adding the common delay would make them equal."""
     joint = 0.3 - 0.2  # another command's time, but for rounding
