@@ -11,7 +11,8 @@ from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.fitting.levenberg_marquardt import fit_blocks, together
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks
+from workbench.identify.fitting.lockstep import together
 from workbench.identify.ledger import layer_of, ledger
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass, SwungMass

@@ -8,7 +8,7 @@ import pytest
 from tests.gap_linear import names, trial
 from tests.identify.small import search_on
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.fitting.lockstep import together
 from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import Response, best_sets, restart_fit, several, variants
 

@@ -10,7 +10,8 @@ from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.covariance import cluster_covariance
 from workbench.identify.fitting.fits import Search
-from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest, together
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest
+from workbench.identify.fitting.lockstep import together
 from workbench.identify.fitting.responses import linearised_estimate, scan
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.levenberg_marquardt import fit_blocks, together
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks
+from workbench.identify.fitting.lockstep import together
 from workbench.identify.fitting.responses import scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate

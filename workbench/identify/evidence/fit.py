@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from scipy.linalg import hadamard
@@ -204,24 +204,3 @@ def drop_effects(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
 def _prior_slopes(prior: Prior, theta: Array) -> Array:
     step = 1e-4
     return np.diag((prior.rows(theta + step) - prior.rows(theta - step)) / (2 * step))
-
-
-def side_by_side(parts: Sequence[Asks[Any]]) -> Asks[list[Any]]:
-    """Several fits of a region side by side, as one."""
-    done: dict[int, Any] = {}
-    wants: dict[int, list[Hypothesis]] = {}
-
-    def advance(k: int, sent: list[Array] | None) -> None:
-        try:
-            wants[k] = next(parts[k]) if sent is None else parts[k].send(sent)
-        except StopIteration as end:
-            wants.pop(k, None)
-            done[k] = end.value
-
-    for k in range(len(parts)):
-        advance(k, None)
-    while wants:
-        answers = iter((yield [h for wanted in wants.values() for h in wanted]))
-        for k, wanted in list(wants.items()):
-            advance(k, [next(answers) for _ in wanted])
-    return [done[k] for k in range(len(parts))]

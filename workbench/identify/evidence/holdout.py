@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.identify.evidence.fit import Asks, Fitted, drop_effects, fit_hypothesis, side_by_side
+from workbench.identify.evidence.fit import Asks, Fitted, drop_effects, fit_hypothesis
+from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
+from workbench.identify.fitting.lockstep import side_by_side, through
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.types import Array
@@ -55,17 +57,11 @@ def veto(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence
     return {effects[k]: gain for k, gain in gains.items() if gain < -options.veto}
 
 
-def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: float, J: Array) -> Asks[Fitted]:
+def _fold(region: Region, seen: Region, options: EvidenceOptions, h: Hypothesis, s: float, J: Array) -> Asks[Fitted]:
     """A fit to the takes that are not held out; its requests are rolled out on all of them."""
     mine = region.of([p.take for p in seen.parts])
-    part = fit_hypothesis(seen, options, h, s, options.iterations, None, J[mine])  # type: ignore[arg-type]
-    try:
-        wants = next(part)
-        while True:
-            answers = yield wants
-            wants = part.send([r[mine] for r in answers])
-    except StopIteration as end:
-        return end.value  # type: ignore[no-any-return]
+    part = fit_hypothesis(seen, options, h, s, options.iterations, None, J[mine])
+    return (yield from through(part, lambda asked: asked, lambda r: r[mine]))
 
 
 def _is_excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:

@@ -16,7 +16,6 @@ from workbench.identify.evidence.fit import (
     evaluate,
     fit_hypothesis,
     polish,
-    side_by_side,
     with_better,
 )
 from workbench.identify.evidence.hypothesis import Hypothesis, start
@@ -32,7 +31,7 @@ from workbench.identify.evidence.linearise import (
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.starts import as_published, at_typical_sizes, fit_from_starts, restart, spread
-from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.fitting.lockstep import side_by_side, together
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.types import Progress
@@ -276,7 +275,7 @@ def with_fits(found: Found, fits: Sequence[Fitted], options: EvidenceOptions) ->
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
     """Results of generators of several regions, whose rollouts are shared."""
-    return together(dict(parts), lambda wanted: rollouts.answers([(i, h) for i, h in wanted]))
+    return together(dict(parts), rollouts.answers)
 
 
 def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candidate]) -> Asks[Found]:

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish, side_by_side
+from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
+from workbench.identify.fitting.lockstep import side_by_side
 
 
 def spread(h: Hypothesis, starts: int) -> list[Hypothesis]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.identify.conclusions import estimates
-from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish, side_by_side, with_better
+from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, polish, with_better
 from workbench.identify.evidence.hypothesis import FAR, Hypothesis, Uncertain
 from workbench.identify.evidence.linearise import linearise, linearised_around
 from workbench.identify.evidence.nuisance import mixing
@@ -18,6 +18,7 @@ from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque, competes
+from workbench.identify.fitting.lockstep import side_by_side
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.findings import Alternative, Estimate, Finding
 from workbench.identify.results.tied_names import GravityOverTorque, TiedName

@@ -21,7 +21,6 @@ from workbench.identify.evidence.fit import (
     drop_effects,
     evaluate,
     fit_hypothesis,
-    side_by_side,
     slopes,
     with_better,
 )
@@ -30,6 +29,7 @@ from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.search import Found
 from workbench.identify.evidence.torque_law import TorqueLaw
+from workbench.identify.fitting.lockstep import side_by_side
 from workbench.types import Array, Mask
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from workbench.compare.metrics import rms
 from workbench.identify.fitting.covariance import covariance_of
 from workbench.identify.fitting.fit import Fit, Slopes
-from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest, through, together
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest
+from workbench.identify.fitting.lockstep import through, together
 from workbench.identify.fitting.responses import Part, ResponseBank
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects

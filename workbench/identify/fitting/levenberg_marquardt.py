@@ -6,9 +6,8 @@ blocks (one joint each), so that one rollout moves all blocks at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +19,6 @@ Point = list[Array]
 Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -188,39 +186,3 @@ def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array)
     move = np.zeros(len(x))
     move[free] = -np.linalg.lstsq(H + damping * np.diag(np.maximum(np.diag(H), 1e-9)), g[free], rcond=None)[0]
     return np.asarray(np.clip(x + move, low, high))
-
-
-def through(fit: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any], tell: Callable[[Any], Any]
-            ) -> Generator[list[Any], list[Any], T]:
-    """A generator as part of another: its requests are passed on through `ask`, the answers through `tell`."""
-    try:
-        wants = next(fit)
-        while True:
-            answers = yield [ask(w) for w in wants]
-            wants = fit.send([tell(a) for a in answers])
-    except StopIteration as end:
-        return end.value  # type: ignore[no-any-return]
-
-
-def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],
-             report: Callable[[float], None] = lambda share: None) -> dict[T, Any]:
-    """Runs generators in lockstep: the requests of every generator are answered in one call. Returns the result of each."""
-    done: dict[T, Any] = {}
-    wants: dict[T, list[Any]] = {}
-
-    def advance(key: T, sent: list[Any] | None) -> None:
-        try:
-            wants[key] = next(asking[key]) if sent is None else asking[key].send(sent)
-        except StopIteration as end:
-            wants.pop(key, None)
-            done[key] = end.value
-
-    for key in asking:
-        advance(key, None)
-    while wants:
-        report(len(done) / max(1, len(asking)))
-        flat = [(key, want) for key, wanted in wants.items() for want in wanted]
-        answers = iter(answer(flat))
-        for key, wanted in list(wants.items()):
-            advance(key, [next(answers) for _ in wanted])
-    return done

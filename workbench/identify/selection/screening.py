@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks, through
+from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks
+from workbench.identify.fitting.lockstep import through
 from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
