@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from workbench.types import Progress
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_again import TakesAsPlayed
     from workbench.identify.estimators.dropped_commands import DroppedCommands
     from workbench.identify.evidence.options import EvidenceOptions
+    from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
@@ -41,60 +43,70 @@ class Problem:
     laws: Mapping[str, RegisterLaw]
 
 
-class SearchResult(Protocol):
-    """Result of a search."""
+@dataclass(frozen=True)
+class SearchResult(ABC):
+    """Result of a search. nominal: the robot without the effects; looked_at: the takes, as far as the search looked at them;
+    missed: commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work ended the
+    search."""
+
+    nominal: RobotModel
+    looked_at: tuple[TakeEvidence, ...]
+    missed: tuple[DroppedCommands, ...]
+    drifts: Sequence[Drift]
+    stopped: bool
 
     @property
+    @abstractmethod
     def model(self) -> RobotModel:
         """The robot with the effects that were found, in addition to the commands that never arrived."""
 
     @property
     def calibrated(self) -> RobotModel:
         """The same, with how well its servos' numbers are known now."""
-
-    @property
-    def missed(self) -> Sequence[DroppedCommands]:
-        """Commands that never arrived."""
-
-    @property
-    def looked_at(self) -> Sequence[TakeEvidence]:
-        """The takes, as far as the search looked at them."""
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the limit of work ended the search."""
+        return self.model
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
+        return ()
 
     @property
     def tied(self) -> tuple[GravityOverTorque, ...]:
         """What angles tell as one number, with all effects that could be it."""
+        return ()
 
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
+        return evaluator
 
+    @abstractmethod
     def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
         """Residuals (N, c) and numerical floors (c,) of the model on whole takes, over sigma."""
 
+    @abstractmethod
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The model's effects. before, after: residuals of the nominal model and of this one."""
 
     def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
         """Torques in the model that no effect describes; before, after as in `findings`."""
+        return ()
 
+    @abstractmethod
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
 
+    @abstractmethod
     def is_slight(self) -> bool:
         """Whether all that shows on frames that were searched is too little for a name."""
 
+    @abstractmethod
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
         """Effects that were tried and are not in the model, and why."""
 
+    @abstractmethod
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
         """Joint posterior of the model's effects; read_off: those that were estimated directly."""
 
+    @abstractmethod
     def ties(self) -> tuple[Tie, ...]:
         """Findings and their rivals that are worth an experiment."""

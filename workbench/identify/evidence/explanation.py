@@ -27,19 +27,18 @@ from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
 from workbench.identify.results.unknown_torque import UnknownTorque, list_arguments
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
+from workbench.identify.search_result import SearchResult
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
 from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
-    from workbench.identify.estimators.dropped_commands import DroppedCommands
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
     from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
     from workbench.identify.evidence.tied_names import TieFits
-    from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
     from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.robot.law_covariance import MotionRange
@@ -49,23 +48,18 @@ WORTH_SAYING = 0.01
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """The most probable model, with all alternatives (a `workbench.identify.search_result.SearchResult`). found, posteriors: one
-    for each region; robot: effects that act on all joints; refuted: effects rejected by registers or by held-out takes; missed:
-    commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work was reached;
-    of_tie: by region, fits of each single cause of its gravity over torque."""
+class Explanation(SearchResult):
+    """The most probable model, with all alternatives. found, posteriors: one for each region; robot: effects that act on all
+    joints; refuted: effects rejected by registers or by held-out takes; of_tie: by region, fits of each single cause of its
+    gravity over torque."""
 
-    nominal: RobotModel
     rollouts: Rollouts
     found: tuple[Found, ...]
     posteriors: tuple[RegionPosterior, ...]
     robot: RobotFound
     refuted: tuple[Rejected, ...]
     options: EvidenceOptions
-    missed: tuple[DroppedCommands, ...] = ()
-    drifts: tuple[Drift, ...] = ()
-    stopped: bool = False
-    of_tie: tuple[TieFits | None, ...] = ()
+    of_tie: tuple[TieFits | None, ...]
 
     @property
     def tied(self) -> tuple[GravityOverTorque, ...]:
@@ -199,15 +193,6 @@ class Explanation:
             whole[at:at + n, at:at + n] = block if block.shape == (n, n) else np.zeros((n, n))
             at += n
         return with_read_off(Posterior(names, mean, CONCLUSIONS.wider**2 * whole), read_off)
-
-    @property
-    def looked_at(self) -> tuple[TakeEvidence, ...]:
-        """The takes, as far as the search looked at them."""
-        return self.rollouts.evaluator.evidence
-
-    def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
-        """Whole takes: the search plays them unchanged."""
-        return evaluator
 
     def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
         """Residuals on whole takes in the limit of a step of zero, and the difference of the last steps, over sigma."""

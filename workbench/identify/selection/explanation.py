@@ -2,86 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.conclusions import ReadOff, Residuals, finding, list_rejected, list_unexplained, posterior, ties
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, with_commands_of
-from workbench.identify.estimators.dropped_commands import DroppedCommands
-from workbench.identify.fitting.constancy import Drift, drifts
+from workbench.identify.fitting.constancy import drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
-from workbench.identify.results.tied_names import GravityOverTorque
+from workbench.identify.results.findings import Finding, Rejected, Unexplained
 from workbench.identify.results.ties import Tie
-from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
-from workbench.identify.search_result import Problem
+from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrate
 from workbench.identify.selection.forward import select
 from workbench.identify.selection.model_comparison import NamePosterior, compare_models
-from workbench.identify.selection.record import SelectionResult
+from workbench.identify.selection.record import SelectionStep
 from workbench.identify.subset import data_subset, floors_everywhere, rebalance
 from workbench.robot import Posterior, RobotModel
 from workbench.types import Progress
 
 
 @dataclass(frozen=True)
-class Selected:
-    """The final fit (a `workbench.identify.search_result.SearchResult`). nominal: the robot without its effects; played: takes
-    as they were sent; posteriors: probability of each effect; floors: numerical error by take, over sigma; drifts: parameters
-    that drift within a take."""
+class Selected(SearchResult):
+    """The final fit. played: takes as they were sent; rounds: of the selection; posteriors: probability of each effect; floors:
+    numerical error by take, over sigma."""
 
-    nominal: RobotModel
     played: TakesAsPlayed
-    looked_at: tuple[TakeEvidence, ...]
-    chosen: SelectionResult
+    rounds: tuple[SelectionStep, ...]
     search: Search
     fit: Fit
     posteriors: Sequence[NamePosterior]
-    floors: Mapping[int, NDArray[np.float64]]
-    drifts: Sequence[Drift]
+    floors: Residuals
 
     @property
     def model(self) -> RobotModel:
         """The robot with its effects."""
         return self.fit.model(self.search.nominal)
 
-    @property
-    def calibrated(self) -> RobotModel:
-        """The same: the nominal law is taken as it is."""
-        return self.model
-
-    @property
-    def missed(self) -> tuple[DroppedCommands, ...]:
-        """Commands that never arrived."""
-        return self.chosen.missed
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the limit of work ended the search."""
-        return self.chosen.stopped
-
-    @property
-    def recalibrated(self) -> tuple[Recalibrated, ...]:
-        """None: the nominal law is taken as it is."""
-        return ()
-
-    @property
-    def tied(self) -> tuple[GravityOverTorque, ...]:
-        """None: cameras and floors see more than angles."""
-        return ()
-
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
-        found = replace(self.played, missed=self.chosen.missed)
+        found = replace(self.played, missed=self.missed)
         return evaluator.on(with_commands_of(evaluator.evidence, found.as_found().evidence))
 
     def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
@@ -100,10 +67,6 @@ class Selected:
         """The effects, in the order in which they were found."""
         return tuple(finding(evidence, self.fit, i, self.posteriors[i], before, after) for i in range(len(self.fit.effects)))
 
-    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
-        """None: of filmed takes no unnamed torque is looked for."""
-        return ()
-
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
         drifting = (d.as_unexplained(evidence) for d in self.drifts)
@@ -116,7 +79,7 @@ class Selected:
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
         """Rivals that lost, and effects that were tried and not accepted."""
         cropped = {i: before[i][:len(e.recorded)] for i, e in enumerate(self.looked_at)}
-        return list_rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
+        return list_rejected(self.looked_at, self.fit, self.rounds, self.posteriors, cropped)
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
         """The joint posterior of the effects' parameters."""
@@ -139,4 +102,5 @@ def explained_by_selection(problem: Problem) -> Selected:
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
-    return Selected(problem.nominal, problem.played, looked_at, chosen, search, fit, sure, floors, changing)
+    return Selected(problem.nominal, looked_at, chosen.missed, changing, any(r.stopped for r in chosen.rounds), problem.played,
+                    chosen.rounds, search, fit, sure, floors)
