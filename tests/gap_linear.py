@@ -7,7 +7,7 @@ import numpy as np
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.record import CandidateFit
 from workbench.robot import puppy_model
 
 COUNT = 900

@@ -30,9 +30,8 @@ from workbench.robot.model_file import Posterior, parameter_names
 from workbench.types import Array
 
 if TYPE_CHECKING:
-    from workbench.identify.selection.candidate_fit import CandidateFit
     from workbench.identify.selection.model_comparison import NamePosterior, Rival
-    from workbench.identify.selection.record import SelectionStep
+    from workbench.identify.selection.record import CandidateFit, SelectionStep
 
 Residuals = Mapping[int, Array]
 

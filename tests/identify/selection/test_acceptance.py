@@ -13,9 +13,8 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import candidates
 from workbench.identify.selection import acceptance
-from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE
-from workbench.identify.selection.record import SelectionStep, accepted_effects, before_rough
+from workbench.identify.selection.record import CandidateFit, SelectionStep, accepted_effects, before_rough
 
 
 def leaving(worn, **sizes):

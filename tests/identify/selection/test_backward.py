@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.identify.selection import backward
-from workbench.identify.selection.backward import without_idle
+from workbench.identify.selection import reconsider
+from workbench.identify.selection.reconsider import without_idle
 
 RNG = np.random.default_rng(3)
 AHEAD, BELOW, INERTIA, CEILING = RNG.normal(size=(4, COUNT))
@@ -28,7 +28,7 @@ class Search(LinearSearch):
 @pytest.mark.parametrize(("against", "stay"), [(False, set(FOUND)), (True, {"torque_ceiling", "payload"})])
 def test_a_load_takes_the_place_of_spring_and_zero_where_fixed_base_takes_contradict_these(monkeypatch, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
-    monkeypatch.setattr(backward, "contradicted_by_fixed_base", lambda *a: against)
+    monkeypatch.setattr(reconsider, "contradicted_by_fixed_base", lambda *a: against)
     fit = search.evaluate([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)
     assert {c.name for c in kept.effects} == stay

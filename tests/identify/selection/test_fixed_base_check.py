@@ -7,7 +7,7 @@ import pytest
 
 from tests.gap_linear import candidate
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
+from workbench.identify.selection.reconsider import checked_on_fixed_base
 
 CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 

@@ -15,8 +15,7 @@ from workbench.identify.point_mass import PointMass
 from workbench.identify.proposals import candidates
 from workbench.identify.selection import calibration
 from workbench.identify.selection.calibration import calibrate
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.model_comparison import NamePosterior, Rival, compare_models
+from workbench.identify.selection.model_comparison import NamePosterior, Rival, compare_models, replace_effect, rivals_near
 from workbench.identify.selection.odds import (
     better_by_both,
     better_on_fixed_base,
@@ -27,8 +26,7 @@ from workbench.identify.selection.odds import (
     numbers_identified,
 )
 from workbench.identify.selection.options import ODDS, SCHEDULING
-from workbench.identify.selection.record import SelectionResult, SelectionStep
-from workbench.identify.selection.rivals import replace_effect, rivals_near
+from workbench.identify.selection.record import CandidateFit, SelectionResult, SelectionStep
 from workbench.identify.selection.screening import fit_groups
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
 from workbench.identify.selection import pair_move
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.record import CandidateFit, SelectionStep
 
 FORWARD, LEFT, SLIPPERY, LIFTS, SOFT = np.random.default_rng(4).normal(size=(5, COUNT)) * 2.0
 DOES = {"ground_tilt": [FORWARD, LEFT], "tether_force": [FORWARD, LEFT, 0.8 * SLIPPERY + 0.6 * LIFTS],

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.reevaluation import reevaluate
+from workbench.identify.selection.reconsider import reevaluate
+from workbench.identify.selection.record import CandidateFit, SelectionStep
 
 SAGS, SPRING, WEAK, FADES = np.random.default_rng(5).normal(size=(4, COUNT))
 DOES = {"supply_voltage": [0.8 * SAGS + 0.5 * SPRING + 0.3 * WEAK], "supply_sag": [SAGS], "thermal_fade": [SAGS + 0.5 * FADES],

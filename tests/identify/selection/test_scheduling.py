@@ -13,8 +13,8 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import candidates, heavy_links
 from workbench.identify.selection import forward, scheduling
-from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SCHEDULING
+from workbench.identify.selection.record import CandidateFit
 from workbench.robot import puppy_model
 
 

@@ -16,10 +16,9 @@ from workbench.identify.fitting.responses import linearised_estimate, scan
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.rollouts.captured import channels_stream
-from workbench.identify.selection.candidate_fit import Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.identify.selection.scheduling import well_on_fixed_base
-from workbench.identify.selection.screening import CandidateEvaluation
+from workbench.identify.selection.screening import CandidateEvaluation, Race, best_at, note_best
 from workbench.robot import EffectSpec
 
 

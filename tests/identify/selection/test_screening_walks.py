@@ -11,8 +11,7 @@ from workbench.identify.fitting.lockstep import together
 from workbench.identify.fitting.responses import scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.candidate_fit import Race
-from workbench.identify.selection.screening import CandidateEvaluation
+from workbench.identify.selection.screening import CandidateEvaluation, Race
 
 
 def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():

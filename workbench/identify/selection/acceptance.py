@@ -12,9 +12,8 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, channel_gaps
-from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
-from workbench.identify.selection.record import SelectionStep, accepted_effects, before_rough
+from workbench.identify.selection.record import CandidateFit, SelectionStep, accepted_effects, before_rough
 from workbench.identify.selection.scheduling import standing_out
 from workbench.types import Array
 

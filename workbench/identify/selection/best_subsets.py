@@ -19,9 +19,8 @@ from workbench.identify.fitting.fit import Fit, Sizes
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.responses import Part
 from workbench.identify.options import FIT
-from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS
-from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.record import CandidateFit, SelectionStep
 from workbench.types import Array, Mask
 
 

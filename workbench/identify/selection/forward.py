@@ -20,15 +20,17 @@ from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import channel_gaps
 from workbench.identify.selection.acceptance import is_acceptable, least_closed, remaining, too_little_left
-from workbench.identify.selection.backward import without_idle, without_part_answers
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
-from workbench.identify.selection.left_to_chance import left_to_chance
 from workbench.identify.selection.options import ACCEPTANCE, FORWARD, SCHEDULING, SUBSETS
 from workbench.identify.selection.pair_move import with_pair
-from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
-from workbench.identify.selection.reevaluation import reevaluate
+from workbench.identify.selection.reconsider import (
+    checked_on_fixed_base,
+    left_to_chance,
+    reevaluate,
+    without_idle,
+    without_part_answers,
+)
+from workbench.identify.selection.record import CandidateFit, SelectionResult, SelectionStep, before_rough
 from workbench.identify.selection.scheduling import groups_to_try, standing_out
 from workbench.identify.selection.screening import fit_groups
 from workbench.identify.selection.swap import best_sets

@@ -10,8 +10,8 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search, gain_between
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ODDS
+from workbench.identify.selection.record import CandidateFit
 
 
 def is_equivalent(search: Search, fit: Fit, i: int, rival: Fit) -> bool:

@@ -74,9 +74,10 @@ class SubsetOptions:
     best, since linear prediction is rough."""
     ahead: int = 2
     exchanges: int = 3
+    exchanged: int = 2
     right: float = 1.2
-    """Sets that are fitted to the end; how often sets with one effect replaced are tried; and the residual of a set, relative to
-    a correct model, at which no effect is replaced."""
+    """Sets that are fitted to the end; how often sets with one effect replaced are tried, with how many others in each one's
+    place; and the residual of a set, relative to a correct model, at which no effect is replaced."""
     again: tuple[tuple[float, float], ...] = tuple(product((0.75, 1.33), (-0.7, 0.7)))
     """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
     most_steps: int = 5
@@ -86,28 +87,17 @@ class SubsetOptions:
 
 
 @dataclass(frozen=True)
-class SwapOptions:
-    """One effect replaced by another."""
-
-    fitted: int = 2
-    """Others that are fitted in each one's place."""
-
-
-@dataclass(frozen=True)
-class ReevaluationOptions:
-    """Accepted effects evaluated again."""
+class ReconsiderOptions:
+    """Accepted effects reconsidered."""
 
     near: float = 0.5
     most: int = 2
-    """Share of its gain that a rival had when it was taken, and how many are fitted."""
-
-
-@dataclass(frozen=True)
-class RecordOptions:
-    """Statements about a finished selection."""
-
+    """Share of its gain that a rival had when an effect was taken, from which on it is fitted in its place, and how many are."""
     complete: float = 0.97
     """Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
+    clearly: float = 5.0
+    """Multiple of the gain required of an effect above which it is missing regardless of how well the others can compensate for
+    it."""
 
 
 @dataclass(frozen=True)
@@ -135,14 +125,6 @@ class AcceptanceOptions:
     last_closed: float = 0.5
     """Share of the excess error at its joint or link that an effect must remove when it is accepted, and together with later
     ones: the first of several may leave much to the next, but an effect that still leaves half at the end is not the cause."""
-
-
-@dataclass(frozen=True)
-class BackwardOptions:
-    """Backward elimination."""
-
-    clearly: float = 5.0
-    """Multiple of that gain above which an effect is missing regardless of how well the others can compensate for it."""
 
 
 @dataclass(frozen=True)
@@ -270,11 +252,8 @@ class CalibrationOptions:
 SCREENING = ScreeningOptions()
 SCHEDULING = SchedulingOptions()
 SUBSETS = SubsetOptions()
-SWAP = SwapOptions()
-REEVALUATION = ReevaluationOptions()
-RECORD = RecordOptions()
+RECONSIDER = ReconsiderOptions()
 ACCEPTANCE = AcceptanceOptions()
-BACKWARD = BackwardOptions()
 PAIR_MOVE = PairOptions()
 FORWARD = ForwardOptions()
 ODDS = OddsOptions()

@@ -20,9 +20,8 @@ from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.identify.selection.acceptance import is_acceptable, too_little_left
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.options import PAIR_MOVE, RECORD
-from workbench.identify.selection.record import SelectionStep, judged_by_all
+from workbench.identify.selection.options import PAIR_MOVE, RECONSIDER
+from workbench.identify.selection.record import CandidateFit, SelectionStep, judged_by_all
 from workbench.identify.selection.swap import NOTHING, in_place
 from workbench.types import Array, Progress
 
@@ -33,7 +32,7 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     or of masses, where that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
     by_all = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
-    if not by_all or by_all[-1][1].closed > RECORD.complete or by_all[-1][1].candidate.effect.point_mass:
+    if not by_all or by_all[-1][1].closed > RECONSIDER.complete or by_all[-1][1].candidate.effect.point_mass:
         return current, list(rounds)
     if too_little_left(search, current, search.fitted, rounds):
         return current, list(rounds)

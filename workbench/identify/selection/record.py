@@ -1,14 +1,35 @@
-"""Record of a search, round by round, with the accepted effects."""
+"""Record of a search: candidates that were fitted or screened out, round by round, with the accepted effects."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.parameters import Candidate
+from workbench.types import Array
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A candidate fitted together with the effects accepted before. gain: of chi squared by use; by_channel: that of "choose", as
+    in `RolloutEvaluator.by_channel`, empty if it was not fitted; closed: share of the excess error on the choosing stretches that
+    it removes; joint: whose channels alone were considered, None for all. screened_out: whether its response alone predicted so
+    much less than a rival's that it was not fitted; promised: the predicted reduction of chi squared by its response, and by the
+    best rival's."""
+
+    candidate: Candidate
+    x: Array
+    gain: Mapping[str, float]
+    joint: str | None
+    screened_out: bool = False
+    promised: tuple[float, float] = (0.0, 0.0)
+    closed: float = 0.0
+    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
 
 @dataclass(frozen=True)

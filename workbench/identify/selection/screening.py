@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
@@ -13,12 +13,38 @@ from workbench.identify.fitting.responses import Part, ResponseBank, linearised_
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest, take_of
-from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
+from workbench.identify.selection.record import CandidateFit
 from workbench.robot import RobotModel
 from workbench.types import Array
 
 Asking = Part[list[CandidateFit]]
+
+
+@dataclass(frozen=True)
+class Race:
+    """Best gains so far, per joint, shared by candidates that are screened together: predicted by the responses of an earlier
+    screening, predicted by the current ones, and achieved by a first step. wide: predicted gain of each candidate that is judged
+    by every channel, with one parameter, at coarse steps, and with several; least: gain that must be predicted for a candidate to
+    be fitted; no_fixed_base: whether no take had a fixed base, so that only floating-base takes constrain the joints."""
+
+    remembered: dict[str | None, float] = field(default_factory=dict)
+    predicted: dict[str | None, float] = field(default_factory=dict)
+    reached: dict[str | None, float] = field(default_factory=dict)
+    wide: dict[bool, list[float]] = field(default_factory=dict)
+    least: float = 0.0
+    no_fixed_base: bool = False
+
+
+def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    """Keeps the largest gain for each joint."""
+    for j, gain in zip(joints, gains):
+        best[j] = max(best.get(j, 0.0), gain)
+
+
+def best_at(best: dict[str | None, float], joint: str | None) -> float:
+    """The best at a joint; over all joints for effects of the whole robot (None)."""
+    return max(best.values()) if joint is None else best[joint]
 
 
 def fit_groups(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],

@@ -30,8 +30,8 @@ from workbench.identify.selection.best_subsets import (
     variants,
     worst_joint,
 )
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.options import SUBSETS, SWAP
+from workbench.identify.selection.options import SUBSETS
+from workbench.identify.selection.record import CandidateFit
 from workbench.types import Array
 
 NOTHING = {"fit": 0.0, "choose": 0.0}
@@ -111,7 +111,7 @@ def exchanges(
         sets = [s for t, points, did in zip(others, probes, responses)
                 for s in in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
         sets.sort(key=lambda s: s[0])
-        out += [chosen for cost, chosen in sets[:SWAP.fitted] if cost < SUBSETS.as_good * sets[0][0]]
+        out += [chosen for cost, chosen in sets[:SUBSETS.exchanged] if cost < SUBSETS.as_good * sets[0][0]]
     return out
 
 
