@@ -13,8 +13,8 @@ from workbench.compare.channels import channel_names, channels_of
 from workbench.compare.session import TakeSpec
 from workbench.compare.session_takes import RegisteredTake
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator
 from workbench.identify.rollouts.captured import Rollout, seen_channels
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.shooting import base_states
 from workbench.motion import load_motion
 from workbench.recording import Measurement, observe

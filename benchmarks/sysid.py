@@ -22,7 +22,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import RolloutEvaluator
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.selection.options import SUBSETS
 from workbench.simulation import SimulationConfig
 from workbench.types import Array

@@ -32,7 +32,7 @@ from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import prepare
-from workbench.identify.rollouts import RolloutEvaluator
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.simulation import SimulationConfig
 from workbench.types import Array
 

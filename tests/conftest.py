@@ -4,7 +4,7 @@ import pytest
 
 from tests.gap_worn import CONFIG, HIDDEN, gathered
 from workbench.identify.fitting.fits import Search
-from workbench.identify.rollouts import RolloutEvaluator
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.simulation.compiled import compile_lanes, compile_station
 
 

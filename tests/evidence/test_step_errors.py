@@ -6,7 +6,7 @@ import pytest
 from tests.evidence.linear import FRAME
 from workbench import load_session
 from workbench.compare.session_takes import read_takes
-from workbench.identify.evidence.step_errors import StepErrors, extrapolate
+from workbench.identify.evidence.rollouts import StepErrors, extrapolate
 from workbench.identify.options import PROBLEM
 from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import SimulationConfig

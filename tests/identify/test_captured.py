@@ -8,8 +8,9 @@ import pytest
 from benchmarks.captured import CONFIG, captured_take, rollout_of
 from workbench.compare.channels import ACROSS, BODY
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, captured
+from workbench.identify.rollouts import captured
 from workbench.identify.rollouts.captured import seen_channels
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel, puppy_model
 from workbench.simulation.batch import run_job
 

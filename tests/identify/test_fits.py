@@ -18,7 +18,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass, SwungMass
 from workbench.identify.problem import ratios, running_means
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection import forward
 from workbench.identify.selection.options import FORWARD
 from workbench.identify.selection.screening import fit_groups

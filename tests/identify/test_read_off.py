@@ -15,11 +15,12 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
 from workbench.identify.conclusions import estimates
-from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimate
 from workbench.identify.estimators.dropped_commands import (
     DroppedCommands,
+    TakesAsPlayed,
     least_explained,
     poses_lost,
+    reestimate,
     stands_at_an_end,
     with_dropped_commands,
 )
@@ -30,7 +31,7 @@ from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.preparation import gather
 from workbench.identify.results.findings import Change
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job
 

@@ -16,7 +16,7 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.gait.evaluate import SEARCH
 from workbench.gait.rollouts import Rollouts
 from workbench.identify.preparation import gather
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.motion import load_motion
 from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig

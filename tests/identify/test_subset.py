@@ -16,7 +16,8 @@ from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather, prepare
 from workbench.identify.problem import part_of
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, servo_logs
+from workbench.identify.rollouts import servo_logs
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.rollouts.servo_logs import most_together
 from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
 from workbench.robot import EffectSpec

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
 from workbench.identify.conclusions import Residuals, change, verdict_of
-from workbench.identify.estimators.dropped_again import TakesAsPlayed
+from workbench.identify.estimators.dropped_commands import TakesAsPlayed
 from workbench.identify.estimators.geometry import Geometry, geometry_of
 from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
@@ -25,7 +26,6 @@ from workbench.identify.evidence.explain import explained_by_evidence, is_by_log
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.heap import give_back
 from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
 from workbench.identify.loads import unloaded_joints
@@ -145,7 +145,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     pool += read_off_candidates(known.model, evidence, start.residuals)
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
-    give_back()
+    _give_back()
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
     search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
@@ -153,7 +153,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
     found = search(Problem(evaluator, known.model, start.residuals, pool, replace(as_played, missed=missed), settings.thorough,
                            progress, options, laws))
 
-    give_back()
+    _give_back()
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)
@@ -217,3 +217,11 @@ def _reports(
         out.append(TakeReport(replace(e.take.recorded, name=e.name), was[i], now[i], tuple(e.channels[k] for k in shown),
                               e.sigma[shown], before[i][:, shown], after[i][:, shown], e.uses["validate"]))
     return tuple(out)
+
+
+def _give_back() -> None:
+    """Gives freed memory back to the system, where the C library can (glibc): arrays of whole recordings leave holes between
+    small objects, which stay with the process otherwise."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)

@@ -11,8 +11,7 @@ from workbench.types import Progress
 
 if TYPE_CHECKING:
     from workbench.identify.conclusions import ReadOff, Residuals
-    from workbench.identify.estimators.dropped_again import TakesAsPlayed
-    from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.estimators.dropped_commands import DroppedCommands, TakesAsPlayed
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate

@@ -8,7 +8,7 @@ from workbench.compare.channels import ACROSS
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import RolloutEvaluator
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.selection.reconsider import left_to_chance
 
 EMPTY = np.empty(0)

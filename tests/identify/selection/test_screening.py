@@ -14,8 +14,8 @@ from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, l
 from workbench.identify.fitting.lockstep import together
 from workbench.identify.fitting.responses import linearised_estimate, scan
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.rollouts.captured import channels_stream
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.options import SCREENING
 from workbench.identify.selection.scheduling import well_on_fixed_base
 from workbench.identify.selection.screening import CandidateEvaluation, Race, best_at, note_best

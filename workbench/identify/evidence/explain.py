@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.estimators.registers import readings
+from workbench.identify.estimators.registers import readings, within_registers
 from workbench.identify.evidence.checks import checks, drifts, refute
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fit_hypothesis, regress
@@ -16,7 +16,6 @@ from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.region import Region, region_of
-from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors

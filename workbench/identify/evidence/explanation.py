@@ -17,7 +17,7 @@ from workbench.identify.evidence.leftover import list_leftover
 from workbench.identify.evidence.motion_range import join_ranges, range_of, tell_faster
 from workbench.identify.evidence.nuisance import as_mapping, mixing, turned_horn, widen, with_known
 from workbench.identify.evidence.recalibration import list_changes
-from workbench.identify.evidence.step_errors import extrapolate
+from workbench.identify.evidence.rollouts import Rollouts, extrapolate
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
 from workbench.identify.options import CONCLUSIONS, PROBLEM
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
-    from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
     from workbench.identify.evidence.tied_names import TieFits
     from workbench.identify.parameters import Candidate

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimate
+from workbench.identify.estimators.dropped_commands import TakesAsPlayed, reestimate
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
