@@ -23,7 +23,7 @@ from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis, Finding
-from workbench.identify.results.tied_names import GravityOverTorque
+from workbench.identify.results.servo_law import GravityOverTorque
 from workbench.robot import RobotModel, load_model
 from workbench.types import Progress
 

@@ -15,7 +15,7 @@ from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.evidence.tied_names import TieFits, fits_of_tie, gravity_over_torque, ratio_of, shared_by_tie
 from workbench.identify.results.findings import Alternative, Change, Estimate, Finding
-from workbench.identify.results.tied_names import GravityOverTorque, TiedName
+from workbench.identify.results.servo_law import GravityOverTorque, TiedName
 
 OPTIONS = EvidenceOptions()
 SHIFT = 0.04

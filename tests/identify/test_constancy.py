@@ -7,7 +7,7 @@ import pytest
 
 from tests.gap_worn import CONFIG
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.constancy import drifts
+from workbench.identify.fitting.doubts import drifts
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.simulation.batch import run_job

@@ -6,11 +6,9 @@ import pytest
 from tests.evidence.rig_logs import record
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
-from workbench.identify.loads import steady_loads, unloaded_joints
 from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import prepare
-from workbench.identify.proposals import candidates
-from workbench.identify.unobservable import HELD, NO_CAMERA, unobservable
+from workbench.identify.proposals import HELD, NO_CAMERA, candidates, steady_loads, unloaded_joints, unobservable
 from workbench.simulation import SimulationConfig
 from workbench.view.report.words import hidden_effects
 

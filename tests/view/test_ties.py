@@ -9,7 +9,7 @@ from tests.example_diagnosis import diagnosis, finding
 from tests.view_takes import small_robot
 from workbench.cli.diagnose import finding_line
 from workbench.identify.results.findings import Alternative, Estimate
-from workbench.identify.results.tied_names import GravityOverTorque, TiedName
+from workbench.identify.results.servo_law import GravityOverTorque, TiedName
 from workbench.view.report.diagnosis import diagnosis_report
 from workbench.view.report.servo_law import tied_in_short
 from workbench.view.report.words import headline

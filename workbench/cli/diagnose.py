@@ -12,7 +12,7 @@ from workbench.cli.options import add_engine, add_out, folder, positive
 
 if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
-    from workbench.identify.results.unknown_torque import UnknownTorque
+    from workbench.identify.results.servo_law import UnknownTorque
 
 
 STAGES = ("reading", "simulating", "looking again", "numbers", "rolling out whole", "rolling out the fitted", "drawing")

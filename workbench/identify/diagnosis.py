@@ -28,11 +28,10 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judge_by_drake
 from workbench.identify.ledger import ledger
-from workbench.identify.loads import unloaded_joints
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.preparation import check_duration, prepare
 from workbench.identify.problem import channel_gaps
-from workbench.identify.proposals import candidates
+from workbench.identify.proposals import candidates, unloaded_joints, unobservable
 from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.ties import ObservationModel, Tie, observation_models
@@ -40,7 +39,6 @@ from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
-from workbench.identify.unobservable import unobservable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig

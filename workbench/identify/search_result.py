@@ -13,13 +13,12 @@ if TYPE_CHECKING:
     from workbench.identify.conclusions import ReadOff, Residuals
     from workbench.identify.estimators.dropped_commands import DroppedCommands, TakesAsPlayed
     from workbench.identify.evidence.options import EvidenceOptions
-    from workbench.identify.fitting.constancy import Drift
+    from workbench.identify.fitting.doubts import Drift
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
-    from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
-    from workbench.identify.results.tied_names import GravityOverTorque
+    from workbench.identify.results.findings import Finding, Rejected, Unexplained
+    from workbench.identify.results.servo_law import GravityOverTorque, Recalibrated, UnknownTorque
     from workbench.identify.results.ties import Tie
-    from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
     from workbench.recording.servo_log.duty_register import RegisterLaw
     from workbench.robot import Posterior, RobotModel

@@ -8,7 +8,7 @@ import pytest
 from tests.gap_worn import HIDDEN, NOMINAL
 from tests.identify.small import candidate, fit_of, leaving, search_on
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.downward_force import downward_pulls
+from workbench.identify.fitting.doubts import downward_pulls
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass

@@ -14,7 +14,7 @@ from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.search import Found, lockstep
-from workbench.identify.fitting.constancy import Drift, drift, trends
+from workbench.identify.fitting.doubts import Drift, drift, trends
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence

@@ -22,10 +22,10 @@ from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
+from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
+from workbench.identify.results.servo_law import GravityOverTorque, Recalibrated, UnknownTorque, list_arguments
 from workbench.identify.results.ties import Tie
-from workbench.identify.results.unknown_torque import UnknownTorque, list_arguments
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.search_result import SearchResult
 from workbench.robot import Posterior, RobotModel
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.search import Found
     from workbench.identify.evidence.tied_names import TieFits
     from workbench.identify.parameters import Candidate
-    from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.robot.law_covariance import MotionRange
 
 WORTH_SAYING = 0.01

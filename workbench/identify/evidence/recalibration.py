@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain
 from workbench.identify.evidence.nuisance import UNITS, changed_by, mixing, nominal_value
-from workbench.identify.results.findings import Recalibrated
+from workbench.identify.results.servo_law import Recalibrated
 from workbench.robot import RobotModel
 
 

@@ -21,7 +21,7 @@ from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_t
 from workbench.identify.fitting.lockstep import side_by_side
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.findings import Alternative, Estimate, Finding
-from workbench.identify.results.tied_names import GravityOverTorque, TiedName
+from workbench.identify.results.servo_law import GravityOverTorque, TiedName
 
 SCALE = "torque_at_full_duty"
 

@@ -13,13 +13,11 @@ from workbench.effects.base import Family, Layer
 from workbench.files.reading import write_together
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.reasons import Description, Reason
-from workbench.identify.results.recalibrated import Recalibrated
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import model_text
 
 if TYPE_CHECKING:
-    from workbench.identify.results.tied_names import GravityOverTorque
-    from workbench.identify.results.unknown_torque import UnknownTorque
+    from workbench.identify.results.servo_law import GravityOverTorque, Recalibrated, UnknownTorque
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.downward_force import pulls_down
+from workbench.identify.fitting.doubts import pulls_down
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate

@@ -9,8 +9,7 @@ import numpy as np
 
 from workbench.identify.conclusions import ReadOff, Residuals, finding, list_rejected, list_unexplained, posterior, ties
 from workbench.identify.estimators.dropped_commands import TakesAsPlayed, with_commands_of
-from workbench.identify.fitting.constancy import drifts
-from workbench.identify.fitting.downward_force import downward_pulls
+from workbench.identify.fitting.doubts import downward_pulls, drifts
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from workbench.identify.results.unknown_torque import UnknownTorque
+from workbench.identify.results.servo_law import UnknownTorque
 from workbench.robot.torque_table import UNITS
 from workbench.view.figures.style import NOISE, SIMULATED, in_house_style, new_figure
 

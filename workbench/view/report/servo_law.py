@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from workbench.identify.results.recalibrated import Recalibrated
-from workbench.identify.results.tied_names import GravityOverTorque
-from workbench.identify.results.unknown_torque import UnknownTorque
+from workbench.identify.results.servo_law import GravityOverTorque, Recalibrated, UnknownTorque
 from workbench.view.figures.unknown_torque import unknown_torque
 from workbench.view.report.page import Part, Picture, Section, Table, Text
 from workbench.view.report.tables import folded_table

@@ -11,8 +11,7 @@ from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.results.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.identify.results.reasons import Dependence, Statement
-from workbench.identify.results.recalibrated import Recalibrated
-from workbench.identify.results.tied_names import GravityOverTorque
+from workbench.identify.results.servo_law import GravityOverTorque, Recalibrated
 from workbench.robot import EffectSpec
 
 NAMED = 0.1

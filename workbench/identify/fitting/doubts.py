@@ -1,4 +1,6 @@
-"""Parameter constancy: physics that the vocabulary lacks can look like a known effect whose parameter drifts within a take."""
+"""Doubts about fitted effects, as physics that the vocabulary lacks can look like a known one: like an effect whose parameter
+drifts within a take, or like a force straight down. A cable pulls up or aside, a load has inertia; a vertical force without
+inertia is a hanging mass."""
 
 from __future__ import annotations
 
@@ -9,10 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.options import FIT
+from workbench.effects.base import si_values
+from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.problem import in_file_units
 from workbench.identify.results.findings import Unexplained
-from workbench.identify.results.reasons import ParameterDrift
+from workbench.identify.results.reasons import DownwardPull, ParameterDrift
+from workbench.robot import GRAVITY
 from workbench.types import Array
 
 if TYPE_CHECKING:
@@ -105,3 +109,25 @@ def trends(r: Array, J: Array, clock: Array, stretches: NDArray[np.int_]) -> Ite
         error = float(np.linalg.norm(by_stretch)) / power
         if abs(change) >= FIT.drift_sure * error and change**2 * power >= FIT.least_gain:
             yield Trend(n, change, error, float(np.sqrt(power / int(np.count_nonzero(r)))))
+
+
+def pulls_down(c: Candidate, x: Array) -> bool:
+    """Whether an effect pulls the base straight down."""
+    aside_x, aside_y, up = _pull(c, x)
+    return bool(np.hypot(aside_x, aside_y) < -CONCLUSIONS.aside * up)
+
+
+def downward_pulls(fit: Fit) -> Iterator[Unexplained]:
+    """Pulls straight down, as something that no effect of the vocabulary is: error is the pull, floor its standard deviation."""
+    for (c, x), own in zip(fit.sizes(), fit.slices()):
+        if pulls_down(c, x):
+            down = -float(_pull(c, x)[2])
+            slopes = np.array([-_pull(c, x + step)[2] - down for step in FIT.slope_step * np.eye(len(x))]) / FIT.slope_step
+            deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
+            yield Unexplained((), down, deviation, "N", DownwardPull(c.name, down / GRAVITY))
+
+
+def _pull(c: Candidate, x: Array) -> Array:
+    """The force (3,) [N] on the base, in the world's axes; zero of an effect that has none."""
+    pull = c.effect.tether(si_values(c.effect, c.spec(x), c.lowest))
+    return np.zeros(3) if pull is None else pull

@@ -1,13 +1,82 @@
-"""The ratio of gravity to torque, which is all that servo logs determine, with every effect that could have changed it."""
+"""What servo logs say of the servos beyond named effects: constants that were adjusted, torques that no known effect describes,
+and the ratio of gravity to torque, which is all that angles determine, with every effect that could have changed it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from workbench.identify.results.findings import Estimate
+from workbench.identify.results.findings import Change, Estimate
+from workbench.robot.torque_table import UNITS, TorqueTable
+
+
+@dataclass(frozen=True)
+class Recalibrated:
+    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding. at_end:
+    whether it went to the end of that, so that the servo's own may lie beyond, and findings there stand for the difference."""
+
+    number: str
+    where: tuple[str, ...]
+    nominal: float
+    value: float
+    sd: float
+    unit: str
+    at_end: bool = False
+
+    @property
+    def sigmas(self) -> float:
+        """How many standard deviations it was adjusted by."""
+        return (self.value - self.nominal) / self.sd
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry in findings.json."""
+        return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
+                "unit": self.unit} | ({"at_end": True} if self.at_end else {})
+
+
+@dataclass(frozen=True)
+class UnknownTorque:
+    """A torque at one joint that no effect describes. confidence: probability (0 to 1) that such a torque is there; rms [N m]:
+    over the recorded motion; tables: the torque, as model.yaml has it; sd [N m]: standard deviations of each table's torques;
+    fit, validation: as in `Finding`."""
+
+    joint: str
+    confidence: float
+    rms: float
+    tables: tuple[TorqueTable, ...]
+    sd: tuple[tuple[float, ...], ...]
+    fit: Change
+    validation: Change
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.confidence <= 1:
+            raise ValueError(f"confidence: expected a probability, got {self.confidence}")
+        if [len(t.torque) for t in self.tables] != [len(s) for s in self.sd]:
+            raise ValueError("sd: expected a number for each torque")
+
+    @property
+    def depends_on(self) -> tuple[str, ...]:
+        """The arguments of the torque."""
+        return tuple(t.depends_on for t in self.tables)
+
+    @property
+    def evidence(self) -> str:
+        """For a person."""
+        return f"{self.joint} has a torque of {1e3 * self.rms:.2g} mN m RMS that depends on {list_arguments(self.depends_on)}, " \
+               "which no known effect describes."
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry in findings.json."""
+        tables = [t.as_dict() | {"unit": UNITS[t.depends_on], "sd": list(sd)} for t, sd in zip(self.tables, self.sd)]
+        return {"joint": self.joint, "confidence": float(self.confidence), "rms": float(self.rms), "unit": "N m",
+                "tables": tables, "fit": self.fit.to_json(), "validation": self.validation.to_json(), "evidence": self.evidence}
+
+
+def list_arguments(names: Sequence[str]) -> str:
+    """The arguments of a torque in a sentence: "angle, and on duty and direction"."""
+    return ", and on ".join(names)
 
 
 @dataclass(frozen=True)
