@@ -24,11 +24,12 @@ from scipy.stats import wilcoxon
 
 from studies.common import ROOT
 from workbench.cli.progress import Progress
+from workbench.compare.metrics import rms
 from workbench.compare.session import Session, load_session
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.identify.diagnosis import DiagnosisResult, diagnose_session
-from workbench.identify.results.take_report import TakeReport, rms
+from workbench.identify.results.take_report import TakeReport
 
 BLOCK = 0.5
 """Length of the blocks whose sums of squares count as one draw [s]: longer than a servo's memory, a third of a step."""
@@ -75,7 +76,7 @@ def by_accident(whole: DiagnosisResult, less: DiagnosisResult) -> float:
 
 
 def _rms(result: DiagnosisResult, nominal: bool) -> float:
-    return rms(np.concatenate([(t.before if nominal else t.after)[t.judged].ravel() for t in result.takes]))
+    return float(rms(np.concatenate([(t.before if nominal else t.after)[t.judged].ravel() for t in result.takes])))
 
 
 def ask(name: str, session: Session, known: Sequence[Asked], jobs: int, progress: Progress) -> Iterator[Asked]:

@@ -127,11 +127,11 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
     ill, better = quiet.copy(), quiet.copy()
     ill[:, e.channels.index("two")] = 3.0
     better[:, e.channels.index("two")] = 2.0
-    assert evaluator.beyond({0: quiet}, "choose") == 0
-    assert evaluator.share_closed({0: ill}, {0: quiet}, "choose") == 1
-    assert 0.4 < evaluator.share_closed({0: ill}, {0: better}, "choose") < 0.8
-    assert evaluator.share_closed({0: ill}, {0: better}, "choose", "one") == 0
-    assert evaluator.share_closed({0: quiet}, {0: ill}, "choose") == 0
+    assert evaluator.beyond({0: quiet}, "choose", {0: quiet}, np.zeros(quiet.shape[1]), False) == 0
+    assert evaluator.share_closed({0: ill}, {0: quiet}) == 1
+    assert 0.4 < evaluator.share_closed({0: ill}, {0: better}) < 0.8
+    assert evaluator.share_closed({0: ill}, {0: better}, "one") == 0
+    assert evaluator.share_closed({0: quiet}, {0: ill}) == 0
 
 
 def test_what_fixed_base_takes_identified_is_judged_on_them_alone(monkeypatch):
@@ -140,7 +140,7 @@ def test_what_fixed_base_takes_identified_is_judged_on_them_alone(monkeypatch):
     fit = fit_of((), {0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
         search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
-            share_closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
+            share_closed=lambda before, after, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
         r = SelectionStep(fit, (), ())
         assert acceptance.explained_at_the_end(search, r, CandidateFit(c, np.ones(1), {}, None), fit) == 1.0
 
@@ -157,7 +157,7 @@ def test_what_floating_base_takes_identify_of_a_joint_is_judged_by_its_own_gap_a
     for own, elsewhere, share in ((1.0, 0.6, 0.8), (0.0, 0.6, 0.6), (0.2, 0.6, 0.6)):  # a zero shows in other joints alone
         shares = {("two", ()): own, (None, ()): 0.2, (None, ("three",)): elsewhere}
         evaluator = SimpleNamespace(
-            share_closed=lambda before, after, use, joint=None, without=(), of=shares: of[joint, tuple(without)]
+            share_closed=lambda before, after, joint=None, without=(), of=shares: of[joint, tuple(without)]
         )
         search = SimpleNamespace(fixed_base=(), fitted=(0,), is_settled=lambda _: False, evaluator=evaluator)
         assert acceptance.explained_at_the_end(search, SelectionStep(fit, (), ()), trial, fit) == pytest.approx(share)

@@ -257,7 +257,7 @@ def test_every_number_of_a_vector_has_its_stretch(quiet):
     _, evidence = quiet
     evaluator = RolloutEvaluator(evidence, CONFIG, n_jobs=1)
     shape = {0: np.zeros_like(evidence[0].recorded)}
-    assert len(evaluator.stretches((0,), "fit")) == len(evaluator.vector(shape, "fit"))
+    assert len(evaluator.stretches((0,))) == len(evaluator.vector(shape, "fit"))
 
 
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):

@@ -26,7 +26,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
     def calmest(explained, least=0.0):
         trying = CandidateEvaluation.__new__(CandidateEvaluation)
         trying.evaluator = SimpleNamespace(expected_cost=lambda takes, use: 60.0,
-                                      stretches=lambda takes, use: np.repeat([0, PROBLEM.most_stretches], 60))
+                                      stretches=lambda takes: np.repeat([0, PROBLEM.most_stretches], 60))
         trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
         trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
         return trying._calmest(probes, responses, explained)

@@ -26,6 +26,7 @@ from workbench.identify.evidence.unknown_law import carried_on, on_windows, slop
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
+from workbench.identify.rollouts.servo_logs import is_log
 from workbench.identify.search_result import Problem
 from workbench.identify.subset import at_most, beginnings
 from workbench.robot import RobotModel
@@ -34,7 +35,7 @@ from workbench.types import Progress
 
 def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:
     """Whether all takes are servo logs of a held robot."""
-    return all(e.take.spec.base == "fixed" and not e.take.recorded.zeroed for e in evidence)
+    return all(is_log(e) for e in evidence)
 
 
 def explained_by_evidence(problem: Problem) -> Explanation:

@@ -18,7 +18,7 @@ def covariance_of(
 ) -> Array:
     """Covariance of a block's numbers. joint: whose channels identify them, None for all; bent: whether contact bends what
     floating-base takes identify. Infinite where nothing depends on a number."""
-    stretches = evaluator.stretches(takes, "fit", joint)
+    stretches = evaluator.stretches(takes, joint)
     engines = bent * FIT.contact_error * np.abs(solved.x) * _floating_share(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)
     temper = FIT.overdispersion_free if bent and evaluator.any_floating(takes) else 1.0

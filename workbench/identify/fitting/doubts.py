@@ -90,7 +90,7 @@ def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[Trend]
     for i in s.takes:
         e = evaluator.evidence[i]
         clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
-    return trends(r, s.J, evaluator.vector(clocks, "fit", s.joint), evaluator.stretches(s.takes, "fit", s.joint))
+    return trends(r, s.J, evaluator.vector(clocks, "fit", s.joint), evaluator.stretches(s.takes, s.joint))
 
 
 def trends(r: Array, J: Array, clock: Array, stretches: NDArray[np.int_]) -> Iterator[Trend]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.compare.metrics import rms
 from workbench.recording.take import Take
 from workbench.types import Array, Mask
 
@@ -55,15 +56,9 @@ class TakeReport:
 
     def ratios(self, residual: Array) -> dict[str, float]:
         """RMS of `before` or `after` on the frames `judged`, by channel; NaN where never seen."""
-        return {c: rms(residual[self.judged, i]) for i, c in enumerate(self.channels)}
+        return {c: float(rms(residual[self.judged, i])) for i, c in enumerate(self.channels)}
 
     def sigma(self, joint: str) -> float:
         """Standard deviation of a joint's residual from noise and numerics alone [rad]; NaN where it was never seen."""
         column = self.channels.index(joint)
         return float(self.noise[column]) if np.isfinite(self.before[:, column]).any() else float("nan")
-
-
-def rms(x: Array) -> float:
-    """Root mean square of the finite values; NaN if there are none."""
-    seen = x[np.isfinite(x)]
-    return float(np.sqrt(np.mean(np.square(seen)))) if len(seen) else float("nan")

@@ -187,37 +187,35 @@ class RolloutEvaluator:
         left = self.vector(residuals, use, joint)
         return float(left @ left)
 
-    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
-               share: float | Array = 0.0, everywhere: bool = False) -> float:
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array], share: Array, everywhere: bool) -> float:
         """Chi squared beyond the expectation of a correct model, of the channels that have a gap, and beyond this share of their
         reduction since `before`. everywhere: for floating-base takes beyond noise alone, since errors of steps and contact models
         are rarely as large as allowed, and for every channel, since effects on the robot's motion appear a little in each."""
         cost, expected = self.by_channel(residuals, use)
-        was = cost if before is None else self.by_channel(before, use)[0]
-        may_err = share * np.maximum(was - cost, 0.0)
+        may_err = share * np.maximum(self.by_channel(before, use)[0] - cost, 0.0)
         widths = [r.shape[1] for _, r in sorted(residuals.items())]
         walking = np.repeat([everywhere and self.any_floating((i,)) for i in sorted(residuals)], widths)
         noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, n) for i, n in zip(sorted(residuals), widths)])
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
 
-    def share_closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
-               without: Collection[str] = ()) -> float:
-        """Share of `before`'s gaps that is closed in `after`, in the channels that had one, so that good channels hide nothing.
-        without: joints whose channels do not count."""
-        cost, expected = self.by_channel(before, use, joint)
-        left, _ = self.by_channel(after, use, joint)
+    def share_closed(self, before: dict[int, Array], after: dict[int, Array], joint: str | None = None,
+                     without: Collection[str] = ()) -> float:
+        """Share of `before`'s gaps on the choosing stretches that is closed in `after`, in the channels that had one, so that
+        good channels hide nothing. without: joints whose channels do not count."""
+        cost, expected = self.by_channel(before, "choose", joint)
+        left, _ = self.by_channel(after, "choose", joint)
         most = self._without_gap(before, cost, expected, joint)
         names = [self.evidence[i].channels[k] for i in sorted(before) for k in self.evidence[i].columns(joint)]
         ill = (cost > most) & ~np.isin([joint_of(c) for c in names], list(without))
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
-    def stretches(self, takes: Sequence[int], use: str, joint: str | None = None) -> NDArray[np.int_]:
-        """For each number of `vector`, which stretch of which take it is of."""
+    def stretches(self, takes: Sequence[int], joint: str | None = None) -> NDArray[np.int_]:
+        """For each number of the fitted `vector`, which stretch of which take it is of."""
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            stretch = i * PROBLEM.most_stretches + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
+            stretch = i * PROBLEM.most_stretches + np.floor(e.since[e.uses["fit"]] / PROBLEM.block).astype(int)
             parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 

@@ -130,10 +130,10 @@ def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now:
     takes = search.fixed_base if search.is_settled(t.candidate) else search.fitted
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
     if t.joint is not None or joint is None or outstanding:
-        return search.evaluator.share_closed(before, after, "choose", joint if outstanding else t.joint)
+        return search.evaluator.share_closed(before, after, joint if outstanding else t.joint)
     others = {c.joint for c in now.effects if c.joint is not None} - {joint}
-    everywhere = search.evaluator.share_closed(before, after, "choose", without=others)
-    return max(everywhere, (everywhere + search.evaluator.share_closed(before, after, "choose", joint)) / 2)
+    everywhere = search.evaluator.share_closed(before, after, without=others)
+    return max(everywhere, (everywhere + search.evaluator.share_closed(before, after, joint)) / 2)
 
 
 def idle(search: Search, fit: Fit) -> list[Candidate]:

@@ -156,7 +156,7 @@ class CandidateEvaluation:
         beyond = {i: self.power[i] - self.evaluator.expected_cost((i,), "fit") for i in self.takes}
         if gain > SCREENING.calm * sum(beyond.values()):
             return None
-        take = take_of(self.evaluator.stretches(self.takes, "fit"))
+        take = take_of(self.evaluator.stretches(self.takes))
         best: tuple[int, Array] | None = None
         most = SCREENING.calm
         for i in self.takes:
@@ -229,7 +229,7 @@ class CandidateEvaluation:
             use: self.evaluator.cost(self.base, use, joint) - self.evaluator.cost(answer, use, joint) for use in ("fit", "choose")
         }
         before, after = (self.evaluator.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
-        return CandidateFit(self.group[b], x, off, joint, closed=self.evaluator.share_closed(self.base, answer, "choose", joint),
+        return CandidateFit(self.group[b], x, off, joint, closed=self.evaluator.share_closed(self.base, answer, joint),
                      by_channel=before - after)
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> RolloutRequest:
