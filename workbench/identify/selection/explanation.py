@@ -101,5 +101,5 @@ def explained_by_selection(problem: Problem) -> Selected:
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
-    return Selected(problem.nominal, looked_at, chosen.missed, changing, any(r.stopped for r in chosen.rounds), problem.played,
-                    chosen.rounds, search, fit, sure, floors)
+    return Selected(problem.nominal, looked_at, chosen.missed, changing, chosen.stopped, problem.played, chosen.rounds, search,
+                    fit, sure, floors)

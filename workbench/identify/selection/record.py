@@ -58,6 +58,11 @@ class SelectionResult:
     rounds: tuple[SelectionStep, ...]
     missed: tuple[DroppedCommands, ...] = ()
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the limit of work ended the search."""
+        return any(r.stopped for r in self.rounds)
+
 
 def accepted_effects(rounds: Sequence[SelectionStep]) -> list[CandidateFit]:
     """The accepted physical effects."""
