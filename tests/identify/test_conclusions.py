@@ -7,13 +7,14 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
-from workbench.identify.conclusions import estimates, finding, list_rejected, list_unexplained, verdict_of
+from workbench.identify.conclusions import estimates, list_unexplained, verdict_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.results.findings import Alternative, Change, Finding, Unexplained
 from workbench.identify.results.reasons import Dependence
+from workbench.identify.selection.explanation import finding, list_rejected
 from workbench.identify.selection.model_comparison import NamePosterior, Rival
 
 FRAME = {0: np.ones((1, 1))}

@@ -1,37 +1,22 @@
-"""From a fit to findings: parameters with intervals, rivals, residuals that remain, and the verdict."""
+"""From fits to conclusions: parameters with intervals, residuals that remain, and the verdict."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, in_file_units, joint_error, ratios
-from workbench.identify.results.findings import (
-    Alternative,
-    Change,
-    Estimate,
-    FamilyBelief,
-    Finding,
-    Rejected,
-    Unexplained,
-    Verdict,
-)
-from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
-from workbench.identify.results.ties import Tie
-from workbench.robot import EffectSpec, RobotModel
+from workbench.identify.results.findings import Change, Estimate, Finding, Unexplained, Verdict
+from workbench.identify.results.reasons import Dependence, Signal
+from workbench.robot import EffectSpec
 from workbench.robot.model_file import Posterior, parameter_names
 from workbench.types import Array
-
-if TYPE_CHECKING:
-    from workbench.identify.selection.model_comparison import NamePosterior, Rival
-    from workbench.identify.selection.record import CandidateFit, SelectionStep
 
 Residuals = Mapping[int, Array]
 
@@ -58,45 +43,6 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -
     if not findings:
         return "unexplained"
     return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
-
-
-def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NamePosterior, before: Residuals, after: Residuals
-            ) -> Finding:
-    """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
-    the nominal and the fitted model."""
-    c, x = fit.sizes()[i]
-    elsewhere = _elsewhere(c, posterior)
-    where = (*c.where, *(place for r in elsewhere for place in r.candidate.where))
-    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in posterior.rivals
-                         if r not in elsewhere and r.probability >= 0.01)[:1]
-    own = fit.slices()[i]
-    numbers = estimates(c, x, fit.covariance[own, own])
-    confidence = posterior.probability + sum(r.probability for r in elsewhere)
-    others = [r for r in posterior.rivals if r not in elsewhere]
-    return Finding(
-        effect=c.name, where=where, confidence=confidence, parameters=numbers,
-        alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
-        validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)),
-        family=_family(c, confidence, others))
-
-
-def _family(c: Candidate, confidence: float, others: Sequence[Rival]) -> FamilyBelief | None:
-    """An effect's family, if it has one, with the probability of rivals of the same family at its joint or link, or of the whole
-    robot, added."""
-    family = c.effect.family
-    if family is None:
-        return None
-    alike = (r.probability for r in others if r.candidate.effect.family == family and r.candidate.where in (c.where, ()))
-    return FamilyBelief(family, confidence + sum(alike))
-
-
-def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
-    """The same effect at other places that the data cannot tell from this one."""
-    return [
-        r
-        for r in posterior.rivals
-        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * posterior.probability
-    ]
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
@@ -144,42 +90,6 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
     return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
 
 
-def list_rejected(
-    evidence: Sequence[TakeEvidence],
-    fit: Fit,
-    rounds: Sequence[SelectionStep],
-    posteriors: Sequence[NamePosterior],
-    before: Residuals,
-) -> tuple[Rejected, ...]:
-    """Rivals that were fitted and lost, and why: each replacement of a finding with its residuals on unseen stretches."""
-    unseen = any(e.uses["validate"].any() for e in evidence)
-    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
-    out: dict[object, Rejected] = {}
-    for c, posterior in zip(fit.effects, posteriors):
-        for rival in posterior.rivals:
-            if rival.candidate.key not in kept and rival.fit is not None:
-                left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
-                out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where,
-                                                    WorseInPlace(c.name, c.where, rival.behind), left)
-    for r in rounds:
-        for t in r.trials:
-            key = t.candidate.key
-            if key in kept or key in out:
-                continue
-            out[key] = Rejected(t.candidate.name, t.candidate.where, _why_not(r, t))
-    return tuple(out.values())
-
-
-def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
-    """Why an effect that was tried in a round was not taken."""
-    best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
-    if t.screened_out:
-        return ScreenedOut(*t.promised)
-    if best is None:
-        return TooLittle()
-    return Outdone(best.candidate.name, best.candidate.where, best.gain["choose"], t.gain["choose"])
-
-
 def list_unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels that exceed 1.3 times noise, floor and spread on unseen stretches, with the signal they correlate with.
 
@@ -215,34 +125,6 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
     if best is None or not found[best] > CONCLUSIONS.correlated:
         return Dependence(e.name, channel)
     return Dependence(e.name, channel, best, found[best])
-
-
-def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
-    """The tie of each finding with its likeliest rival, where that was fitted and is worth an experiment."""
-    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
-                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
-
-
-def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
-    """Joint posterior in the units of docs/formats.md; variances by the local slope between a size and its value. read_off:
-    effects of one parameter that were estimated directly."""
-    if not fit.effects and not read_off:
-        return Posterior()
-    names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))
-    mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
-    slopes = np.zeros((len(mean), len(fit.x)))
-    for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
-        slopes[row:row + len(c.neutral), s] = value_slopes(c, fit.x[s])
-    known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
-    inner = CONCLUSIONS.wider**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
-    covariance = slopes @ inner @ slopes.T
-    lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
-    covariance[lost] = covariance[:, lost] = np.inf
-    spread = np.concatenate([np.empty(0), *(c.spread or np.zeros(len(c.neutral)) for c in fit.effects)])
-    for k in np.flatnonzero(spread):
-        covariance[k] = covariance[:, k] = 0.0
-        covariance[k, k] = spread[k] ** 2
-    return with_read_off(Posterior(tuple(names), mean, covariance), read_off)
 
 
 def with_read_off(fitted: Posterior, read_off: Sequence[ReadOff]) -> Posterior:
