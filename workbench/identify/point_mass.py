@@ -29,35 +29,30 @@ def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) ->
 
 @dataclass(frozen=True)
 class PointMass(Candidate):
-    """A payload. Sizes: its mass and its moments about the link's centre of mass."""
+    """A payload. Sizes: its mass and its moments about the link's centre of mass. It is looked at on both sides, as a vector has
+    no sign."""
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the units of docs/formats.md; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
     def bounds(self) -> tuple[Array, Array]:
-        """Bounds of the sizes x, lower and upper."""
         low, high = super().bounds()
         low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
 
     def seldom(self) -> Array:
-        """Not known of moments."""
-        return np.full(self.size, np.nan)
+        return np.full(self.size, np.nan)  # of moments it is not known
 
     def probes(self) -> list[Array]:
-        """Sizes at which each number is alone typical."""
         return [np.array([1.0, *(FIT.away * np.eye(4)[k, 1:])]) for k in range(4)]
 
     def around(self) -> list[Array]:
-        """Sizes to both sides, as a vector has no sign."""
         middle, *probes = self.probes()
         return [middle, *both_ways(middle, [p - middle for p in probes])]
 
     @property
     def makes(self) -> Mask:
-        """Which sizes make the effect: where all are 0, it is not there."""
         return np.arange(self.size) == 0
 
 
@@ -70,26 +65,21 @@ class SwungMass(PointMass):
 
     @property
     def size(self) -> int:
-        """How many numbers are fitted."""
         return 3
 
     @property
     def shapes(self) -> Mask:
-        """Which sizes only shape the effect."""
         return np.array([True, False, False])
 
     @property
     def of_vector(self) -> Mask:
-        """Which sizes are components of a vector."""
         return ~self.shapes
 
     @property
     def makes(self) -> Mask:
-        """Which sizes make the effect: where all are 0, it is not there."""
         return ~self.shapes
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the units of docs/formats.md; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         away = FIT.swung_distance * 2.0 ** float(np.clip(x[0], *FIT.swung_doublings))
         unit = self.typical[0] * (self.typical[1] - self.neutral[1])  # of moments [kg m]
@@ -100,17 +90,14 @@ class SwungMass(PointMass):
         return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
 
     def bounds(self) -> tuple[Array, Array]:
-        """Bounds of the sizes x, lower and upper."""
         return np.array([FIT.swung_doublings[0], -FIT.most_moment, -FIT.most_moment]), np.array(
             [FIT.swung_doublings[1], FIT.most_moment, FIT.most_moment]
         )
 
     def probes(self) -> list[Array]:
-        """Sizes at which each number is alone typical."""
         return [FIT.away * np.eye(3)[k] for k in (1, 2)]
 
     def around(self) -> list[Array]:
-        """Sizes to both sides, as a vector has no sign."""
         return both_ways(np.zeros(3), self.probes())
 
     @property

@@ -1,4 +1,5 @@
-"""Results of a diagnosis (docs/formats.md, section 6), typed: the verdict, the gap, its explanation, and the unexplained rest."""
+"""Results of a diagnosis (docs/formats.md, section 6), typed: the verdict, the gap, its explanation, and the unexplained rest.
+`to_json` of each type is its entry in findings.json."""
 
 from __future__ import annotations
 
@@ -33,7 +34,6 @@ class Change:
     unit: str
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"before": _number(self.before), "after": _number(self.after), "unit": self.unit}
 
 
@@ -56,7 +56,6 @@ class Estimate:
                 raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"value": _numbers(self.value), "low": _numbers(self.low), "high": _numbers(self.high), "unit": self.unit}
 
 
@@ -72,7 +71,6 @@ class Alternative:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence)}
 
 
@@ -87,7 +85,6 @@ class FamilyBelief:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"name": self.name, "confidence": _number(self.confidence)}
 
 
@@ -136,7 +133,6 @@ class Finding:
         return max(self.of_tie or 0.0, self.confidence + sum(a.confidence for a in self.alternatives)) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
                 **({} if self.of_tie is None else {"of_tie": _number(self.of_tie)}),
                 **({} if self.family is None else {"family": self.family.to_json()}),
@@ -155,7 +151,6 @@ class Rejected:
     validation: Change | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.in_words()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
@@ -179,7 +174,6 @@ class GapEntry:
             raise ValueError(f"layer: expected one of {', '.join(get_args(Layer))}, got {self.layer!r}")
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"layer": self.layer, "where": list(self.where), "take": self.take,
                 "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_optional("phase", self.phase),
                 "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit}
@@ -196,7 +190,6 @@ class Unexplained:
     description: Description
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
                 "description": self.description.in_words()}
 

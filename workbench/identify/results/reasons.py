@@ -30,7 +30,7 @@ class Statement(ABC):
 
     @abstractmethod
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, without a full stop."""
+        """The statement in words, without a full stop, effects named by `naming`."""
 
     def __str__(self) -> str:
         return self.in_words()
@@ -53,7 +53,6 @@ class WorseInPlace(Reason):
     behind: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         more = f"{self.behind:.0f} higher" if self.behind >= 0 else f"only {-self.behind:.0f} lower"
         return f"in place of {naming(self.effect, self.where)} it leaves chi squared {more} on held-out stretches"
 
@@ -67,7 +66,6 @@ class ScreenedOut(Reason):
     best: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         takes = f"reduces chi squared by {self.gain:.0f} at most" if self.gain >= 1 else "does not reduce chi squared"
         return f"its response does not match the residuals: it {takes}, the best competing effect by {self.best:.0f}"
 
@@ -77,7 +75,6 @@ class TooLittle(Reason):
     """Nothing was accepted at this joint or link."""
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return "it reduces the error no more than chance would, or removes too little of the excess error there"
 
 
@@ -92,7 +89,6 @@ class Outdone(Reason):
     gain: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return (f"{naming(self.effect, self.where)} reduces chi squared by {self.taken:.0f} on the stretches that decide between "
                 f"effects, this one by {self.gain:.0f}")
 
@@ -104,7 +100,6 @@ class LessLikely(Reason):
     behind: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return f"the best model containing it is {_times(self.behind)} less probable"
 
 
@@ -115,7 +110,6 @@ class SpokenAgainst(Reason):
     by: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return f"with it, the held-out takes are {_times(self.by)} less probable"
 
 
@@ -129,7 +123,6 @@ class RefutedByRegister(Reason):
     unit: str
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         value = f"{self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
         return f"the servos' own registers show that {self.parameter} is {value}"
 
@@ -143,7 +136,6 @@ class AtItsEnd(Reason):
     unit: str
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         value = f"{self.value:.3g}{_behind_number(self.unit)}"
         return f"its {self.parameter} would have to be {value} or beyond, which is not plausible for this robot"
 
@@ -176,7 +168,6 @@ class Dependence(Description):
     worst: str = ""
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         what = (f"{self.channel}, " if self.channel in BODY else
                 f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
         goes = "no correlation with any tested signal" if self.signal is None else (
@@ -196,7 +187,6 @@ class ParameterDrift(Description):
     unit: str
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return (f"{self.parameter} of {naming(self.effect, self.where)} would have to change from {self.first:.3g} to "
                 f"{self.last:.3g} {self.unit} within a take: the cause may be something that varies with time")
 
@@ -209,6 +199,5 @@ class DownwardPull(Description):
     mass: float
 
     def in_words(self, naming: Naming = effect_at) -> str:
-        """The reason in words, effects named by `naming`."""
         return (f"the {self.effect.replace('_', ' ')} is a vertical pull of {1e3 * self.mass:.0f} g, but without the inertia of "
                 "a load: the cause may be something that hangs and swings")

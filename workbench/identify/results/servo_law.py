@@ -1,5 +1,6 @@
 """What servo logs say of the servos beyond named effects: constants that were adjusted, torques that no known effect describes,
-and the ratio of gravity to torque, which is all that angles determine, with every effect that could have changed it."""
+and the ratio of gravity to torque, which is all that angles determine, with every effect that could have changed it. `to_json`
+of each type is its entry in findings.json."""
 
 from __future__ import annotations
 
@@ -31,7 +32,6 @@ class Recalibrated:
         return (self.value - self.nominal) / self.sd
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
                 "unit": self.unit} | ({"at_end": True} if self.at_end else {})
 
@@ -68,7 +68,6 @@ class UnknownTorque:
                "which no known effect describes."
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         tables = [t.as_dict() | {"unit": UNITS[t.depends_on], "sd": list(sd)} for t, sd in zip(self.tables, self.sd)]
         return {"joint": self.joint, "confidence": float(self.confidence), "rms": float(self.rms), "unit": "N m",
                 "tables": tables, "fit": self.fit.to_json(), "validation": self.validation.to_json(), "evidence": self.evidence}
@@ -91,7 +90,6 @@ class TiedName:
     behind: float
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"effect": self.effect, "where": list(self.where), "behind": round(self.behind, 1),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()}, "evidence": self.sentence}
 
@@ -155,7 +153,6 @@ class GravityOverTorque:
         return f"{self.change} {causes_said} To find out, hang a known weight on the link in some takes (`load:`){more}."
 
     def to_json(self) -> dict[str, Any]:
-        """The entry in findings.json."""
         return {"ratio": "gravity over torque", "where": list(self.where), **self.ratio.to_json(),
                 "confidence": float(self.confidence), "torque_behind": round(self.torque_behind, 1),
                 "names": [n.to_json() for n in self.names], "evidence": self.in_words()}
