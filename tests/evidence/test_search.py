@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import FRAME, Linear, candidate, linear, region
+from workbench.identify.evidence.checks import veto
 from workbench.identify.evidence.fit import fit_hypothesis, regress
-from workbench.identify.evidence.holdout import veto
 from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import posterior_of

@@ -109,11 +109,7 @@ class TakeEvidence:
         corrected: for the search's step."""
         simulated = simulated + self.offset if corrected else simulated
         simulated = self._shift(self._lying_in_its_play(simulated, model))
-        return (self.recorded - simulated) / self._frame_sigma
-
-    @property
-    def _frame_sigma(self) -> Array:
-        return np.asarray(self.sigma * self.rough)
+        return np.asarray((self.recorded - simulated) / (self.sigma * self.rough))
 
     def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
         """A link with play hangs free in it while the base is fixed: where it lay when the recording was zeroed no model knows,

@@ -44,11 +44,6 @@ class Likelihood:
         """Number of independent samples that each frame counts as (n,), at most one."""
         return np.asarray(np.minimum(self.span / (2.0 * self.tau), 1.0))
 
-    @property
-    def samples(self) -> float:
-        """How many independent samples there are."""
-        return float(self.counts.sum())
-
     def scale(self, s: float) -> Array:
         """Scale of the residuals (n,) [rad], at a discrepancy s."""
         return np.asarray(np.hypot(self.known, s))
