@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from workbench.effects.base import Family, Layer
 from workbench.files.reading import write_together
@@ -169,10 +169,6 @@ class GapEntry:
     unit: str
     phase: str = ""
 
-    def __post_init__(self) -> None:
-        if self.layer not in get_args(Layer):
-            raise ValueError(f"layer: expected one of {', '.join(get_args(Layer))}, got {self.layer!r}")
-
     def to_json(self) -> dict[str, Any]:
         return {"layer": self.layer, "where": list(self.where), "take": self.take,
                 "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_optional("phase", self.phase),
@@ -238,10 +234,6 @@ class Diagnosis:
     tied: tuple[GravityOverTorque, ...] = ()
     unknown_torques: tuple[UnknownTorque, ...] = ()
 
-    def __post_init__(self) -> None:
-        if self.verdict not in get_args(Verdict):
-            raise ValueError(f"verdict: expected one of {', '.join(get_args(Verdict))}, got {self.verdict!r}")
-
     def to_json(self) -> dict[str, Any]:
         """Content of findings.json (docs/formats.md, section 6)."""
         out: dict[str, Any] = {
@@ -251,17 +243,11 @@ class Diagnosis:
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_json(),
             "provenance": dict(self.provenance),
         }
-        if self.unknown_torques:
-            out["unknown_torques"] = [u.to_json() for u in self.unknown_torques]
-        if self.recalibrated:
-            out["recalibrated"] = [r.to_json() for r in self.recalibrated]
-        if self.tied:
-            out["tied"] = [t.to_json() for t in self.tied]
-        if self.stopped:
-            out["stopped"] = True
-        if self.left_out:
-            out["left_out"] = [{"take": name, "reason": reason} for name, reason in self.left_out]
-        return out
+        seldom: dict[str, Any] = {
+            "unknown_torques": [u.to_json() for u in self.unknown_torques],
+            "recalibrated": [r.to_json() for r in self.recalibrated], "tied": [t.to_json() for t in self.tied],
+            "stopped": self.stopped, "left_out": [{"take": name, "reason": reason} for name, reason in self.left_out]}
+        return out | {key: entry for key, entry in seldom.items() if entry}
 
     def save(self, folder: str | Path) -> list[Path]:
         """Writes findings.json, model.yaml and nominal.yaml into `folder`, all or none; returns their paths."""
