@@ -71,9 +71,9 @@ class LinearSearch:
 
     def run(self, part):
         try:
-            next(part)
+            wants = next(part)
             while True:
-                part.send([])
+                wants = part.send(self.answers(wants))
         except StopIteration as end:
             return end.value
 

@@ -7,14 +7,15 @@ adapt: a saturating motor compensates for much of a leaning body.
 """
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from workbench.identify.fitting.fit import Fit, Sizes
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
+from workbench.identify.fitting.responses import Part
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.identify.rollouts.evaluator import RolloutRequest
@@ -63,63 +64,47 @@ def _may_pair(c: Candidate) -> bool:
     return c.size > 0 and c.effect.layer in ("ground", "inertia") and not c.effect.point_mass
 
 
-@dataclass(frozen=True)
-class _Around:
-    """Questions around a fit with one effect: each parameter that floating-base takes identify is perturbed, and each other
-    effect is added."""
+def _predict_pairs(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: Sequence[Candidate]
+                   ) -> list[list[CandidateFit]]:
+    """The pairs with the smallest residuals according to lines around each one's fit, with sizes to begin from."""
+    takes = search.telling([t.candidate for t in ones], search.fitted)
+    around = [(t.candidate, search.evaluate([*rest.sizes(), (t.candidate, t.x)])) for t in ones]
+    best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}
+    for predicted in search.side_by_side([_pairs_with(search, c, fit, others, takes) for c, fit in around]):
+        for cost, pair in predicted:
+            name = frozenset(t.candidate.key for t in pair)
+            best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
+    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIR_MOVE.pairs]]
 
-    one: CandidateFit
-    fit: Fit
-    moves: list[tuple[Candidate, Array, Array]]
-    probes: list[tuple[Candidate, list[Array]]]
 
-    @classmethod
-    def of(cls, one: CandidateFit, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
-        c = one.candidate
-        company = [o for o in others if o.key != c.key and not (o.effect.steady_pull and c.effect.steady_pull)]
-        moves = [(e, x, steps_of(x, *e.bounds(), FIT.stride_free, e.magnitudes(x))) for e, x in fit.sizes()
-                 if e.size and not search.is_settled(e)]
-        return cls(one, fit, moves, [(o, _probes(o)) for o in company])
-
-    def sizes_around(self) -> Iterator[Sizes]:
-        yield self.fit.sizes()
-        for e, x, move in self.moves:
-            yield from (self.fit.sizes_with(e.key, moved) for moved in x + np.diag(move))
-        for c, points in self.probes:
-            yield from ([*self.fit.sizes(), (c, p)] for p in points)
-
-    def predictions(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
-        """Predicted residual of each pair, and its sizes. left: residuals of this fit; answers: those of every question."""
-        plain = next(answers)
-        slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
-        moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]
-        for c, points in self.probes:
-            did = [next(answers) - plain for _ in points]
-            for cost, chosen in in_place(CandidateFit(c, points[0], NOTHING, None), points, did, left, moving, x, slopes):
-                yield cost, [t for t in chosen if t.candidate.key in (self.one.candidate.key, c.key)]
+def _pairs_with(search: Search, one: Candidate, fit: Fit, others: Sequence[Candidate], takes: tuple[int, ...]
+                ) -> Part[list[tuple[float, list[CandidateFit]]]]:
+    """The predicted residual of each pair with an effect, and its sizes, from coarse rollouts around a fit with that effect: each
+    parameter that floating-base takes identify is moved, and each other effect is added."""
+    moves = [(e, x, steps_of(x, *e.bounds(), FIT.stride_free, e.magnitudes(x))) for e, x in fit.sizes()
+             if e.size and not search.is_settled(e)]
+    probes = [(c, _probes(c)) for c in others if c.key != one.key and not (c.effect.steady_pull and one.effect.steady_pull)]
+    asked: list[Sizes] = [fit.sizes()]
+    asked += [fit.sizes_with(e.key, moved) for e, x, move in moves for moved in x + np.diag(move)]
+    asked += [[*fit.sizes(), (c, p)] for c, points in probes for p in points]
+    answers = yield [RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for sizes in asked]
+    plain, *seen = (search.evaluator.vector(answer, "fit") for answer in answers)
+    did = iter([r - plain for r in seen])
+    slopes = [np.column_stack([next(did) / size for size in move]) for _, _, move in moves]
+    left = search.evaluator.vector({i: fit.residuals[i] for i in takes}, "fit")
+    moving, x = [e for e, _, _ in moves], [x for _, x, _ in moves]
+    out: list[tuple[float, list[CandidateFit]]] = []
+    for c, points in probes:
+        added = CandidateFit(c, points[0], NOTHING, None)
+        for cost, chosen in in_place(added, points, [next(did) for _ in points], left, moving, x, slopes):
+            out.append((cost, [t for t in chosen if t.candidate.key in (one.key, c.key)]))
+    return out
 
 
 def _probes(c: Candidate) -> list[Array]:
     """Sizes at which an effect is looked at: the floor's alone at two."""
     sizes = (FIT.scanned_around,) if c.size > 1 else FIT.scanned_ground[:1] if c.where else FIT.scanned_ground
     return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
-
-
-def _predict_pairs(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: Sequence[Candidate]
-                   ) -> list[list[CandidateFit]]:
-    """The pairs with the smallest residuals according to lines around each one's fit, with sizes to begin from."""
-    takes = search.telling([t.candidate for t in ones], search.fitted)
-    around = [_Around.of(t, search.evaluate([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
-    questions = [
-        RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.sizes_around()
-    ]
-    answers = iter([search.evaluator.vector(answer, "fit") for answer in search.evaluator.residuals(questions)])
-    best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}
-    for a in around:
-        for cost, pair in a.predictions(search.evaluator.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
-            name = frozenset(t.candidate.key for t in pair)
-            best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
-    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIR_MOVE.pairs]]
 
 
 def _enough(search: Search, fit: Fit, pair: Sequence[CandidateFit], current: Fit, rounds: Sequence[SelectionStep]) -> bool:
