@@ -66,11 +66,8 @@ def heavy_links(model: RobotModel) -> list[str]:
     k = model.kinematics
     feet = list(model.foot_links.values())
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
-    return [
-        link
-        for link in k.links
-        if k.masses[link] >= k.mass * (PROBLEM.heavy_trunk if feet and carried[link] != 1 else PROBLEM.heavy)
-    ]
+    return [link for link in k.links
+            if k.masses[link] >= k.mass * (PROBLEM.heavy_trunk if feet and carried[link] != 1 else PROBLEM.heavy)]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:

@@ -67,15 +67,10 @@ class DroppedCommands:
         from scipy.stats import binomtest  # half a second of imports, which most diagnoses do without
 
         low, high = binomtest(self.count, self.of).proportion_ci(0.9, "exact")
-        return Finding(
-            self.effect,
-            (self.joint,),
-            READ_OFF.dropped_probability,
-            {self._parameter: Estimate(self.probability, float(low), float(high), "1")},
-            self.fit,
-            self.validation,
-            evidence=effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)",
-        )
+        number = Estimate(self.probability, float(low), float(high), "1")
+        said = effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)"
+        return Finding(self.effect, (self.joint,), READ_OFF.dropped_probability, {self._parameter: number}, self.fit,
+                       self.validation, evidence=said)
 
 
 def with_dropped_commands(
@@ -92,29 +87,22 @@ def with_dropped_commands(
         lost, after = poses_lost(evaluator, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
         count, of = sum(map(len, lost.values())), sum(_telling(evaluator.evidence[i], joint, k) for i, k in lost.items())
         least = least_explained(evaluator, {i: len(k) for i, k in lost.items()})
-        if least is None or count > READ_OFF.most_dropped * of:
+        if least is None or count > READ_OFF.most_dropped * of or stands_at_an_end(evaluator.evidence, joint, lost):
             continue
-        if stands_at_an_end(evaluator.evidence, joint, lost):
-            continue
-        here = [i for i, k in lost.items() if k]
-        was, now = (float(sum(np.nansum(np.square(r[i][:, evaluator.evidence[i].columns(joint)])) for i in here))
-                    for r in (residuals, after))
-        frames = sum(np.isfinite(residuals[i][:, evaluator.evidence[i].columns(joint)]).sum() for i in here)
+        gone = {i: k for i, k in lost.items() if k}
+        columns = {i: evaluator.evidence[i].columns(joint) for i in gone}
+        was, now = (float(sum(np.nansum(np.square(r[i][:, own])) for i, own in columns.items())) for r in (residuals, after))
+        frames = sum(np.isfinite(residuals[i][:, own]).sum() for i, own in columns.items())
         if was - now > least * (was - frames) and was - now > 100:
             fit, unseen = (Change(joint_error(evaluator.evidence, [joint], residuals, use),
                                   joint_error(evaluator.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
-            found.append(DroppedCommands(effect.name, joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
-            evaluator, residuals = played_without(evaluator, {(i, joint): k for i, k in lost.items() if k}), after
+            found.append(DroppedCommands(effect.name, joint, gone, of, fit, unseen))
+            evaluator, residuals = played_without(evaluator, {(i, joint): k for i, k in gone.items()}), after
     return evaluator, tuple(found)
 
 
-def poses_lost(
-    evaluator: RolloutEvaluator,
-    nominal: RobotModel,
-    joint: str,
-    known: Mapping[int, tuple[int, ...]],
-    residuals: Mapping[int, Array],
-) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
+def poses_lost(evaluator: RolloutEvaluator, nominal: RobotModel, joint: str, known: Mapping[int, tuple[int, ...]],
+               residuals: Mapping[int, Array]) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
     """Poses that a joint missed, by take, and the residuals of the takes played without them. known: those missed in motion.
     Poses after a missed one are examined again, compared with a robot that did not receive it either."""
     lost, now = dict(known), dict(residuals)

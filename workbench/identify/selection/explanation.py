@@ -163,13 +163,8 @@ def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
     return [r for r in posterior.rivals if r.candidate.name == c.name and r.probability >= least]
 
 
-def list_rejected(
-    evidence: Sequence[TakeEvidence],
-    fit: Fit,
-    rounds: Sequence[SelectionStep],
-    posteriors: Sequence[NamePosterior],
-    before: Residuals,
-) -> tuple[Rejected, ...]:
+def list_rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[SelectionStep],
+                  posteriors: Sequence[NamePosterior], before: Residuals) -> tuple[Rejected, ...]:
     """Rivals that were fitted and lost, and why: each replacement of a finding with its residuals on unseen stretches."""
     unseen = any(e.uses["validate"].any() for e in evidence)
     kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}

@@ -77,14 +77,8 @@ def _fit_sets(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], 
     return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[SUBSETS.ahead:]], key=lambda f: penalised_cost(f[0]))
 
 
-def exchanges(
-    search: Search,
-    fit: Fit,
-    trials: Sequence[CandidateFit],
-    takes: tuple[int, ...],
-    joint: str,
-    alone: Sequence[Candidate],
-) -> list[list[CandidateFit]]:
+def exchanges(search: Search, fit: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], joint: str,
+              alone: Sequence[Candidate]) -> list[list[CandidateFit]]:
     """Sets in which another effect replaces one of `alone`, which `fit` has among others, with initial sizes. trials: all
     candidates that were tried for the joint, on these takes, whose base is fixed."""
     there = fit.sizes_by_key()
