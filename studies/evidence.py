@@ -51,7 +51,7 @@ def evidence(out: Path, quick: bool, progress: Callable[[str, float | None], Non
     config = SimulationConfig(settle=0.1, contact_period=0, time_step=4e-3)
     evaluator = RolloutEvaluator(prepare(session, takes, config, 1, progress).evidence, config, 1)
     joint = session.model.joints[0]
-    numbers = [n for n in uncertain_numbers(session.model, joint, zeroed=False) if n.name in NUMBERS]
+    numbers = [n for n in uncertain_numbers(session.model, joint) if n.name in NUMBERS]
     region = region_of([joint], evaluator.evidence, numbers, (), OPTIONS)
     rollouts = Rollouts.of(evaluator, session.model, [region])
     rows = ["| model | Laplace [nats] | nested sampling [nats] | rollouts |", "|---|---|---|---|"]

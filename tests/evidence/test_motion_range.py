@@ -58,7 +58,7 @@ def test_only_a_faster_motion_is_told():
 
 def test_the_range_is_kept_in_the_model(tmp_path):
     model = rig_model(tmp_path, ServoConstants())
-    numbers = uncertain_numbers(model, "j", zeroed=False)
+    numbers = uncertain_numbers(model, "j")
     for observed in (SLOW, None):
         known = with_known(model, numbers, 0.1 * np.eye(len(numbers)), {"j": observed})
         save_model(known, tmp_path / "out" / "model.yaml")

@@ -12,10 +12,10 @@ from workbench.effects.registers import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
+from workbench.identify.evidence.explanation import list_changes
 from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain, start
 from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
-from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.parameters import Candidate
 from workbench.robot import ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
@@ -53,14 +53,13 @@ def test_what_is_no_number_is_refused_by_its_key(tmp_path, value, said):
 
 def test_numbers_that_are_exact_are_no_nuisance(tmp_path):
     model = rig_model(tmp_path, ServoConstants(sd=tuple((key, 0.0) for key in SHARES_KNOWN)))
-    assert uncertain_numbers(model, "j", zeroed=True) == []
-    assert [n.name for n in uncertain_numbers(model, "j", zeroed=False)] == ["zero"]
+    assert [n.name for n in uncertain_numbers(model, "j")] == ["zero"]
 
 
 def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     model = rig_model(tmp_path, ServoConstants())
     servo = model.servo("j")
-    numbers = {n.name: n for n in uncertain_numbers(model, "j", zeroed=False)}
+    numbers = {n.name: n for n in uncertain_numbers(model, "j")}
     assert set(numbers) == {"torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia",
                             "zero"}
     for name, number in numbers.items():
@@ -84,7 +83,7 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
 
 def test_all_numbers_recalibrated_as_far_as_they_go_are_still_those_of_a_servo(tmp_path):
     model = rig_model(tmp_path, load_servo_constants(written(tmp_path)))
-    numbers = uncertain_numbers(model, "j", False)
+    numbers = uncertain_numbers(model, "j")
     for signs in (1.0, -1.0):
         apart = {n: signs * FAR * (-1.0 if n.name == "back_emf" else 1.0) for n in numbers}
         servo = recalibrate(model, apart).servo("j")

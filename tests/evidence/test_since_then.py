@@ -7,10 +7,10 @@ import pytest
 
 from tests.servo_rig import rig_model
 from workbench.files import InputError
+from workbench.identify.evidence.explanation import list_changes
 from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.nuisance import mixing, recalibrate, uncertain_numbers, uncertain_since, widen, with_known
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.evidence.recalibration import list_changes
 from workbench.robot import ServoConstants, load_model
 from workbench.robot.model_file import save_model
 from workbench.robot.servo_constants import servo_constants
@@ -21,9 +21,9 @@ SINCE = SinceThen()
 def known_after(tmp_path, covariance):
     """The numbers of tomorrow, and the model of today, whose numbers have this covariance of standard deviations."""
     model = rig_model(tmp_path, ServoConstants())
-    numbers = uncertain_numbers(model, "j", zeroed=False)
+    numbers = uncertain_numbers(model, "j")
     save_model(with_known(model, numbers, covariance(numbers)), tmp_path / "out" / "model.yaml")
-    return numbers, uncertain_since(load_model(tmp_path / "out" / "model.yaml"), "j", False, SINCE)
+    return numbers, uncertain_since(load_model(tmp_path / "out" / "model.yaml"), "j", SINCE)
 
 
 def test_what_a_diagnosis_knew_is_kept_in_its_model(tmp_path):
@@ -87,7 +87,7 @@ def test_what_is_no_covariance_is_refused(tmp_path, content, said):
 
 def test_of_a_data_sheet_torque_is_known_to_its_tolerance_alone(tmp_path):
     def known(**constants):
-        return {n.name: n.sd for n in uncertain_numbers(rig_model(tmp_path, ServoConstants(**constants)), "j", True)}
+        return {n.name: n.sd for n in uncertain_numbers(rig_model(tmp_path, ServoConstants(**constants)), "j")}
 
     assert known()["torque_at_full_duty"] == known()["back_emf"] == EvidenceOptions.sheet
     assert known(torque_tolerance=0.1)["torque_at_full_duty"] == 0.1

@@ -31,7 +31,7 @@ def test_the_robot_stays_and_the_prior_grows(tmp_path, name):
     model = rig_model(tmp_path, SERVO)
     effect = effect_named(name)
     for c in Candidate.of(effect, ("j",), effect.neutral(model), lowest=effect.lowest(model, ("j",))).one_way():
-        h = start(uncertain_numbers(model, "j", zeroed=False))
+        h = start(uncertain_numbers(model, "j"))
         (k,) = (k for k, n in enumerate(h.numbers) if n.is_changed_by(effect))
         h = h.with_effect(c, np.array([0.3 * ADDED[name]]))
         h = h.at(np.where(np.arange(len(h.theta)) == k, 1.7, h.theta))
@@ -57,7 +57,7 @@ def test_what_is_taken_away_altogether_is_left_as_it_is(tmp_path):
     model = rig_model(tmp_path, SERVO)
     effect = effect_named("coulomb_friction")
     _, less = Candidate.of(effect, ("j",), effect.neutral(model), lowest=effect.lowest(model, ("j",))).one_way()
-    h = start(uncertain_numbers(model, "j", zeroed=False)).with_effect(less, less.bounds()[1])
+    h = start(uncertain_numbers(model, "j")).with_effect(less, less.bounds()[1])
     h = h.at(np.where(h.theta == 0, -0.5, h.theta))
     split, _ = split_sums(h, np.ones((1, len(h.theta))), OPTIONS)
     np.testing.assert_array_equal(split.theta, h.theta)

@@ -121,8 +121,8 @@ def _add_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOp
 
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
             ) -> Region:
-    numbers = (uncertain_numbers(nominal, joint, False, options.sheet) if options.drift is None
-               else uncertain_since(nominal, joint, False, options.drift))
+    numbers = (uncertain_numbers(nominal, joint, options.sheet) if options.drift is None
+               else uncertain_since(nominal, joint, options.drift))
     return region_of([joint], evidence, numbers, _acting(pool, joint, nominal), options)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,19 @@ import numpy as np
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
-from workbench.identify.evidence.hypothesis import ZERO
+from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain
 from workbench.identify.evidence.leftover import list_leftover
 from workbench.identify.evidence.motion_range import join_ranges, range_of, tell_faster
-from workbench.identify.evidence.nuisance import as_mapping, mixing, turned_horn, widen, with_known
-from workbench.identify.evidence.recalibration import list_changes
+from workbench.identify.evidence.nuisance import (
+    UNITS,
+    as_mapping,
+    changed_by,
+    mixing,
+    nominal_value,
+    turned_horn,
+    widen,
+    with_known,
+)
 from workbench.identify.evidence.rollouts import Rollouts, extrapolate
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
@@ -239,3 +247,16 @@ class Explanation(SearchResult):
                     hypotheses[k] = other.hypothesis
                     out.append(Tie(self.model, self.rollouts.model(hypotheses), rival[1]))
         return tuple(out)
+
+
+def list_changes(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
+    """Nominal and recalibrated values, for the report, those that went furthest first."""
+    sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
+    ended = {(n.joint, n.name) for n, by in z.items() if math.isclose(abs(by), FAR, rel_tol=1e-3)}
+    out = []
+    for (joint, name), by in changed_by(z).items():
+        nominal = 0.0 if name == ZERO else nominal_value(model.servo(joint), name)
+        value = by if name == ZERO else nominal * math.exp(by)
+        out.append(Recalibrated(name, (joint,), nominal, value, sds[joint, name] * (nominal or 1.0), UNITS[name],
+                                (joint, name) in ended))
+    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

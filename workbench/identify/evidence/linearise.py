@@ -13,14 +13,10 @@ from workbench.identify.evidence.fit import Asks, Fitted, evaluate, slopes
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.types import Array, Mask
 
-AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
-"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
-nothing until it is met."""
-SHAPES = (0.0, 2.0, -2.0)
-"""Doublings of a parameter that only shapes an effect: a fit from a wrong start ends in a local minimum."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
 """Shares of the way between two sizes that were seen, and beyond the last and to the other side, at which lines are read."""
 
@@ -161,8 +157,9 @@ def points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
     own = dict(zip(h.labels, h.theta))
     start = np.array([own.get(label, 0.0) for label in labels_of(c)])
     new = np.array([label not in own for label in labels_of(c)])
-    shapes = SHAPES if (c.shapes & new).any() else (0.0,)
-    amounts = ENDLESS if any(np.isinf(n) for n in c.neutral) else AMOUNTS
+    shapes = FIT.shaped if (c.shapes & new).any() else (0.0,)
+    endless = any(np.isinf(n) for n in c.neutral)  # as a ceiling, which shows nothing until it is met
+    amounts = sorted((*FIT.scanned, FIT.scanned_between)) if endless else FIT.scanned
     out: list[tuple[Array, int]] = []
     for k, d, amount in product(np.flatnonzero(new & ~c.shapes), shapes, amounts):
         x = start + d * (c.shapes & new)

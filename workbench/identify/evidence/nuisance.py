@@ -31,14 +31,14 @@ UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_frictio
 apart."""
 
 
-def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
+def uncertain_since(model: RobotModel, joint: str, drift: SinceThen) -> list[Uncertain]:
     """The uncertain numbers of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they
     drift.
 
     Torque, friction and load friction are known much better together than one by one: their difference lifts an arm. Each
     number returned moves those after it, so that all are independent (Cholesky's factor of the covariance)."""
     servo = model.servo(joint)
-    names = [name for name in UNITS if name != ZERO and nominal_value(servo, name) > 0] + ([] if zeroed else [ZERO])
+    names = [*(name for name in UNITS if name != ZERO and nominal_value(servo, name) > 0), ZERO]
     known = (np.diag([0.0 if name == ZERO else servo.share_known(name)**2 for name in names]) if servo.covariance is None
              else servo.covariance.among(names))
     L = np.linalg.cholesky(known + np.diag([drift.of(name)**2 for name in names]))
@@ -46,17 +46,16 @@ def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThe
                       _in_si(servo, name)) for k, name in enumerate(names)]
 
 
-def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
-    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
-    tells a zero. sheet: standard deviation of the logarithm of torque and back-EMF of which nobody says how well they are
-    known."""
+def uncertain_numbers(model: RobotModel, joint: str, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
+    """The numbers of one joint's servo that are not known exactly. sheet: standard deviation of the logarithm of torque and
+    back-EMF of which nobody says how well they are known."""
     servo = model.servo(joint)
     shares = {name: servo.share_known(name) for name in UNITS if name != ZERO}
     shares |= {name: sheet for name, (tolerance, keys) in OF_SHEET.items()
                if getattr(servo, tolerance) is None and not set(keys) & set(dict(servo.sd))}
     out = [Uncertain(joint, name, share, nominal=_in_si(servo, name)) for name, share in shares.items()
            if share > 0 and nominal_value(servo, name) > 0]
-    return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD, nominal=0.0)]
+    return [*out, Uncertain(joint, ZERO, ZERO_SD, nominal=0.0)]
 
 
 def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
