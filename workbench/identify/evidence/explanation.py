@@ -113,8 +113,8 @@ class Explanation(SearchResult):
             joint = region.joints[0]
             beyond = tell_faster(joint, self._known_range(joint), self._range_now(joint), self.options.faster)
             for (c, x), s in zip(h.sizes(), h.slices()):
-                family, elsewhere = c.effect.family, p.elsewhere((c.name, c.where))
-                rival = p.rival((c.name, c.where), elsewhere)
+                family, elsewhere = c.effect.family, p.elsewhere(c.key)
+                rival = p.rival(c.key, elsewhere)
                 others = [] if rival is None else [Alternative(*rival[0], CONCLUSIONS.surest * rival[1])]
                 share = CONCLUSIONS.surest
                 if (of_all := self.robot.rivals.get(c.key)) is not None:
@@ -139,7 +139,7 @@ class Explanation(SearchResult):
 
     def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:
         """Clause of a finding's sentence about an unnamed torque as an alternative."""
-        depends_on, probability = p.unnamed_instead((c.name, c.where))
+        depends_on, probability = p.unnamed_instead(c.key)
         if probability < CONCLUSIONS.worth_an_experiment:
             return ""
         return f" Or ({probability:.2f}) a torque that depends on {list_arguments(depends_on)}, which no known effect describes."
@@ -224,12 +224,12 @@ class Explanation(SearchResult):
         out = list(self.refuted)
         listed = {(r.effect, r.where) for r in out}
         for p, found in zip(self.posteriors, self.found):
-            kept = {(c.name, c.where) for c in p.best.hypothesis.effects}
+            kept = {c.key for c in p.best.hypothesis.effects}
             for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior):
                 for c in f.hypothesis.effects:
-                    if (c.name, c.where) in kept | listed:
+                    if c.key in kept | listed:
                         continue
-                    listed.add((c.name, c.where))
+                    listed.add(c.key)
                     behind = p.best.log_posterior - f.log_posterior
                     out.append(Rejected(c.name, c.where, LessLikely(behind)))
         return tuple(out)
@@ -239,9 +239,9 @@ class Explanation(SearchResult):
         out = []
         for k, p in enumerate(self.posteriors):
             for c in p.best.hypothesis.effects:
-                rival = p.rival((c.name, c.where))
-                other = next((f for f, _ in p.weights if rival and rival[0] in {(o.name, o.where) for o in f.hypothesis.effects}
-                              and (c.name, c.where) not in {(o.name, o.where) for o in f.hypothesis.effects}), None)
+                rival = p.rival(c.key)
+                other = next((f for f, _ in p.weights if rival and rival[0] in {o.key for o in f.hypothesis.effects}
+                              and c.key not in {o.key for o in f.hypothesis.effects}), None)
                 if rival is not None and other is not None and rival[1] > CONCLUSIONS.worth_an_experiment:
                     hypotheses = [q.best.hypothesis for q in self.posteriors]
                     hypotheses[k] = other.hypothesis

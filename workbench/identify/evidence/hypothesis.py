@@ -133,7 +133,7 @@ class Hypothesis:
 
     def with_effect(self, c: Candidate, x: Array) -> Hypothesis:
         """The hypothesis with one more effect, which replaces the same one with other options."""
-        bare = self.without(lambda other: (other.name, other.where) == (c.name, c.where))
+        bare = self.without(lambda other: other.key == c.key)
         return replace(bare, effects=(*bare.effects, c), theta=np.concatenate([bare.theta, x]))
 
     def without(self, gone: object) -> Hypothesis:

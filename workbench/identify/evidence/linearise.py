@@ -44,9 +44,9 @@ class Probe:
 
 def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
     """Effects that the hypothesis lacks, and its own with one option more."""
-    there, ties = {(c.name, c.where) for c in h.effects}, {c.effect.tied for c in h.effects}
+    there, ties = {c.key for c in h.effects}, {c.effect.tied for c in h.effects}
     out = [c for c in region.candidates
-           if (c.name, c.where) not in there and (c.effect.tied is None or c.effect.tied not in ties)]
+           if c.key not in there and (c.effect.tied is None or c.effect.tied not in ties)]
     for c in h.effects:
         more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
         out += [c.with_options((*c.options, name)) for name in more]

@@ -12,9 +12,7 @@ from workbench.effects.registry import known_effects
 from workbench.identify.evidence.fit import Fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.options import CONCLUSIONS
-
-Named = tuple[str, tuple[str, ...]]
-"""An effect's name, and where it acts."""
+from workbench.identify.parameters import Key
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class RegionPosterior:
     is there; families: that any effect of a family is."""
 
     weights: tuple[tuple[Fitted, float], ...]
-    named: Mapping[Named, float]
+    named: Mapping[Key, float]
     families: Mapping[Family, float]
 
     @property
@@ -31,7 +29,7 @@ class RegionPosterior:
         """Probability of a torque that nobody has named."""
         return min(1.0, sum(w for f, w in self.weights if f.hypothesis.law is not None))
 
-    def unnamed_instead(self, of: Named) -> tuple[tuple[str, ...], float]:
+    def unnamed_instead(self, of: Key) -> tuple[tuple[str, ...], float]:
         """The variables of an unnamed torque in the most probable model that has one instead of an effect, and the probability of
         all such models."""
         models = [(f, w) for f, w in self.weights if f.hypothesis.law is not None and of not in _names(f)]
@@ -46,23 +44,23 @@ class RegionPosterior:
         """The likeliest model."""
         return self.weights[0][0]
 
-    def elsewhere(self, of: Named) -> dict[Named, float]:
+    def elsewhere(self, of: Key) -> dict[Key, float]:
         """The same effect at other places, with the probability that it is there and not here, where that is a good part of what
         it is here: the data cannot tell these places apart."""
-        kept, out = _names(self.best), dict[Named, float]()
+        kept, out = _names(self.best), dict[Key, float]()
         for f, w in self.weights:
             if of not in _names(f):
                 for other in {n for n in _names(f) - kept if n[0] == of[0]}:
                     out[other] = out.get(other, 0.0) + w
         return {other: w for other, w in out.items() if w >= CONCLUSIONS.same_elsewhere * self.named[of]}
 
-    def rival(self, of: Named, besides: Collection[Named] = ()) -> tuple[Named, float] | None:
+    def rival(self, of: Key, besides: Collection[Key] = ()) -> tuple[Key, float] | None:
         """The most probable alternative to `of`: an effect that the best model does not have, and that is not in `besides`."""
         kept = _names(self.best) | set(besides)
         family = known_effects()[of[0]].family
-        instead: dict[Named, float] = {}
+        instead: dict[Key, float] = {}
         for f, w in self.weights:
-            names = {(c.name, c.where) for c in f.hypothesis.effects}
+            names = _names(f)
             if of in names:
                 continue
             for other in names - kept:
@@ -80,7 +78,7 @@ def posterior_of(fits: Sequence[Fitted], options: EvidenceOptions) -> RegionPost
     near = [f for f in ordered if f.log_posterior > ordered[0].log_posterior - options.occam]
     weights = np.exp([f.log_posterior - near[0].log_posterior for f in near])
     weights /= weights.sum()
-    named: dict[Named, float] = {}
+    named: dict[Key, float] = {}
     families: dict[Family, float] = {}
     for f, w in zip(near, weights.tolist()):
         for name in _names(f):
@@ -92,5 +90,5 @@ def posterior_of(fits: Sequence[Fitted], options: EvidenceOptions) -> RegionPost
     return RegionPosterior(tuple(zip(near, weights.tolist())), *sums)  # type: ignore[arg-type]
 
 
-def _names(f: Fitted) -> set[Named]:
-    return {(c.name, c.where) for c in f.hypothesis.effects}
+def _names(f: Fitted) -> set[Key]:
+    return {c.key for c in f.hypothesis.effects}

@@ -12,10 +12,15 @@ from workbench.identify.evidence.fit import (
     Asks,
     Fitted,
     Key,
+    as_published,
+    at_typical_sizes,
     drop_effects,
     evaluate,
+    fit_from_starts,
     fit_hypothesis,
     polish,
+    restart,
+    spread,
     with_better,
 )
 from workbench.identify.evidence.hypothesis import Hypothesis, start
@@ -30,7 +35,6 @@ from workbench.identify.evidence.linearise import (
 )
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.starts import as_published, at_typical_sizes, fit_from_starts, restart, spread
 from workbench.identify.fitting.lockstep import side_by_side, together
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
@@ -124,7 +128,8 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
 
     def everywhere(part: Callable[[Found], Asks[Found]], these: Collection[int]) -> None:
         nonlocal rollouts, found
-        found = _replace(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
+        done = lockstep(rollouts, {i: part(found[i]) for i in sorted(these)})
+        found = [done.get(i, f) for i, f in enumerate(found)]
         rollouts = with_best(rollouts, found)
 
     everywhere(lambda f: _renew_correlation(f, options, exploring, True), range(len(found)))
@@ -292,7 +297,3 @@ def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candi
 def with_best(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
     """The rollouts with the best fit of each region as its hypothesis."""
     return replace(rollouts, regions=tuple(f.region for f in found), standing=tuple(f.best.hypothesis for f in found))
-
-
-def _replace(found: Sequence[Found], done: Mapping[int, Found]) -> list[Found]:
-    return [done.get(i, f) for i, f in enumerate(found)]
