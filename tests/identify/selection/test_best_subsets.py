@@ -51,10 +51,9 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
 
 def test_a_walk_and_what_one_explains_are_left_to_single_effects():
     search = search_on("free")
-    assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
+    assert several(search, None, [trial("backlash")], (0,), "knee") == []
     held = search_on("fixed")
-    assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
-    assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
+    assert several(held, None, [trial("backlash", closed=0.95)], (0,), "knee") == []
 
 
 def test_pairs_that_lines_predict_about_as_well_are_all_fitted():

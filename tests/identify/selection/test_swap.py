@@ -83,7 +83,7 @@ def test_sets_are_replaced_until_none_is_better_unless_the_first_leaves_no_more_
         return sorted(zip(fits, sets), key=lambda f: f[0].cost["choose"])
 
     monkeypatch.setattr(swap, "_fit_sets", fitted)
-    (fit, chosen), *rest = swap.best_sets(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
+    (fit, chosen), *rest = swap.sets_at_worst_joint(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
     assert {t.candidate.name for t in chosen} == {"viscous_friction", "dead_band" if replaced else "backlash"}
     assert bool(rest) is replaced
     assert fit.cost["choose"] <= min((f.cost["choose"] for f, _ in rest), default=np.inf)

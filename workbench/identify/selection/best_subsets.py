@@ -55,13 +55,13 @@ class Response:
         return np.asarray(np.linalg.pinv(self.points[:, ~self.shapes].T), dtype=float)
 
 
-def subsets_for(
-    search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], joint: str
-) -> list[list[CandidateFit]]:
-    """Sets of effects that, as responses predict it, explain a joint far better than fewer do, with sizes to begin from.
-
-    trials: of a screening beside `current` on these takes, whose base is fixed.
-    """
+def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], joint: str
+            ) -> list[list[CandidateFit]]:
+    """Sets of effects that, as responses predict it, explain a joint far better than fewer do, with sizes to begin from, where
+    the base is fixed and no single effect is most of its gap. trials: of a screening beside `current` on these takes."""
+    alone = max((t.closed for t in trials if t.joint in (joint, None)), default=0.0)
+    if search.evaluator.any_floating(takes) or alone > SUBSETS.nearly_all:
+        return []
     known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
     base = {i: current.residuals[i] for i in takes}
     rows = {j: _rows(search, current, takes, j, joint) for j in {t.joint for t, _ in known} | {joint}}
@@ -154,17 +154,6 @@ def worst_joint(beyond: dict[str, float]) -> str | None:
     """The joint that errs most; None where none does."""
     worst = max((c for c in beyond if c not in BODY), key=lambda c: beyond[c], default=None)
     return None if worst is None else joint_of(worst)
-
-
-def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
-            ) -> list[list[CandidateFit]]:
-    """Sets of effects for the joint that errs most, where the base is fixed and no single one is most of it."""
-    joint = worst_joint(beyond)
-    if joint is None or search.evaluator.any_floating(takes):
-        return []
-    if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > SUBSETS.nearly_all:
-        return []
-    return subsets_for(search, current, trials, takes, joint)
 
 
 def fitted_beside(search: Search, current: Fit, added: Sequence[CandidateFit], takes: tuple[int, ...], steps: int) -> Part[Fit]:

@@ -33,7 +33,7 @@ from workbench.identify.selection.reconsider import (
 from workbench.identify.selection.record import CandidateFit, SelectionResult, SelectionStep, before_rough
 from workbench.identify.selection.scheduling import groups_to_try, standing_out
 from workbench.identify.selection.screening import fit_groups
-from workbench.identify.selection.swap import best_sets
+from workbench.identify.selection.swap import sets_at_worst_joint
 from workbench.types import Progress
 
 
@@ -118,7 +118,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         ]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
         of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
-        sets = [] if stopped or read_off or of_all else best_sets(search, current, trials, takes, beyond)
+        sets = [] if stopped or read_off or of_all else sets_at_worst_joint(search, current, trials, takes, beyond)
         if sets and penalised_cost(sets[0][0]) < SUBSETS.half * penalised_cost(after):
             after = sets[0][0]
             taken_in = [replace(taken_in[0], accepted=()), *selection_steps(search, current, sets)]

@@ -38,12 +38,12 @@ NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only predict."""
 
 
-def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
-              ) -> list[tuple[Fit, list[CandidateFit]]]:
+def sets_at_worst_joint(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...],
+                        beyond: dict[str, float]) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
     replaced, until none of these is better."""
     joint = worst_joint(beyond)
-    sets = _fit_sets(search, current, several(search, current, trials, takes, beyond), takes)
+    sets = [] if joint is None else _fit_sets(search, current, several(search, current, trials, takes, joint), takes)
     if joint is None or not sets:
         return []
     for _ in range(SUBSETS.exchanges):
