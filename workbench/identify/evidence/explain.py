@@ -84,9 +84,10 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, last.evidence))
-    return Explanation(nominal, evidence, problem.played.missed, drifting, stopped,
-                       replace(with_best(rollouts, found), shared=together.shared), found, believed, robot, tuple(rejected),
-                       options, tuple(ties.get(k) for k in range(len(found))))
+    return Explanation(
+        nominal=nominal, looked_at=evidence, missed=problem.played.missed, drifts=drifting, stopped=stopped, found=found,
+        rollouts=replace(with_best(rollouts, found), shared=together.shared), posteriors=believed, robot=robot,
+        refuted=tuple(rejected), options=options, of_tie=tuple(ties.get(k) for k in range(len(found))))
 
 
 def _search(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,

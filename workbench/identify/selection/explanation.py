@@ -123,8 +123,8 @@ def explained_by_selection(problem: Problem) -> Selected:
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     sure = calibrate(search, fit, posteriors, floors, [d.effect for d in changing], idle(search, fit))
-    return Selected(problem.nominal, looked_at, chosen.missed, changing, chosen.stopped, problem.played, chosen.rounds, search,
-                    fit, sure, floors)
+    return Selected(nominal=problem.nominal, looked_at=looked_at, missed=chosen.missed, drifts=changing, stopped=chosen.stopped,
+                    played=problem.played, rounds=chosen.rounds, search=search, fit=fit, posteriors=sure, floors=floors)
 
 
 def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NamePosterior, before: Residuals, after: Residuals
