@@ -22,7 +22,7 @@ from workbench.identify.selection.odds import (
     is_equivalent,
     is_outpriced,
 )
-from workbench.identify.selection.options import COMPARISON, FORWARD, RIVAL
+from workbench.identify.selection.options import COMPARISON, FORWARD
 from workbench.identify.selection.record import CandidateFit, SelectionResult, SelectionStep
 from workbench.types import Array, Progress
 
@@ -70,7 +70,7 @@ def compare_models(search: Search, chosen: SelectionResult, report: Progress) ->
         taken_in[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
         if search.is_settled(replaced):
             search, best = search.resettle(best, best.effects[-1])
-        fit = search.refit(best, search.fitted, RIVAL.steps)
+        fit = search.refit(best, search.fitted, COMPARISON.steps)
     return search, fit, [_posterior(search, fit, i, there, taken_in) for i, there in enumerate(rivals)]
 
 
@@ -96,7 +96,7 @@ def rivals_near(search: Search, taken_in: TakenIn, effects: Sequence[Candidate],
     much once they are fitted to the end."""
     r, trial = taken_in[c.key]
     taken = {e.key for e in effects}
-    reach = max(RIVAL.near, (FORWARD.close if trial.joint is None else RIVAL.near_fixed) * trial.gain["choose"])
+    reach = max(COMPARISON.near, (FORWARD.close if trial.joint is None else COMPARISON.near_fixed) * trial.gain["choose"])
     there = [t for t in r.rivals(trial) if t.candidate.key not in taken]
     alike = {(name, c.where) for name in c.effect.equivalent_to if trial.joint is None}
     if _at_its_end(c, x):
@@ -117,7 +117,7 @@ def _behind(trial: CandidateFit, t: CandidateFit) -> float:
 def _at_its_end(c: Candidate, x: Array) -> bool:
     """Whether a number that only shapes an effect, if there is one, is as far as it may go."""
     low, high = c.bounds()
-    return not c.shapes.any() or bool(np.any(c.shapes & ((x < low + RIVAL.shape_end) | (x > high - RIVAL.shape_end))))
+    return not c.shapes.any() or bool(np.any(c.shapes & ((x < low + COMPARISON.shape_end) | (x > high - COMPARISON.shape_end))))
 
 
 def replace_effect(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
@@ -132,9 +132,9 @@ def replace_effect(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Par
     if values and rival.candidate.where == own.where:
         starts.append(rival.candidate.sizes(values))
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
-    if there.cost["choose"] - fit.cost["choose"] > max(2 * RIVAL.near, 2 * FORWARD.close * rival.gain["choose"]):
+    if there.cost["choose"] - fit.cost["choose"] > max(2 * COMPARISON.near, 2 * FORWARD.close * rival.gain["choose"]):
         return there
     fixed = search.identified_on_fixed_base(own)
     takes = search.fixed_base if fixed else search.fitted
     beside = [j for j, (c, _) in enumerate(others) if fixed and c.joint == own.joint]
-    return (yield from search.refitting(there, takes, RIVAL.steps, free=[*beside, len(others)]))
+    return (yield from search.refitting(there, takes, COMPARISON.steps, free=[*beside, len(others)]))

@@ -194,8 +194,8 @@ class OddsOptions:
 
 
 @dataclass(frozen=True)
-class RivalOptions:
-    """Which rivals are fitted in an effect's place."""
+class ComparisonOptions:
+    """Rivals in an effect's place: which are fitted there, and what their odds are."""
 
     near: float = 400.0
     near_fixed: float = 0.05
@@ -205,12 +205,6 @@ class RivalOptions:
     """Of a fit: names that differ by little are told apart at their best alone."""
     shape_end: float = 0.5
     """Doublings from its end at which a number that only shapes an effect hardly does so any more."""
-
-
-@dataclass(frozen=True)
-class ComparisonOptions:
-    """Rivals in an effect's place."""
-
     likelier: float = 0.5
     """A rival whose lead is this share of what leads are divided by is a fourth likelier, and takes an effect's place."""
     least_equivalent: float = 1.0 / 3.0
@@ -257,6 +251,5 @@ ACCEPTANCE = AcceptanceOptions()
 PAIR_MOVE = PairOptions()
 FORWARD = ForwardOptions()
 ODDS = OddsOptions()
-RIVAL = RivalOptions()
 COMPARISON = ComparisonOptions()
 CALIBRATION = CalibrationOptions()
