@@ -34,6 +34,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Co
     unloaded: joints that nothing loads in these takes (`unloaded_joints`)."""
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
+    zeroed = all(e.take.recorded.zeroed for e in evidence)
     start_known = not any(e.start_is_free for e in evidence)
     sdf = SdfRobot(model.path)
     out: list[Candidate] = []
@@ -41,7 +42,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Co
     for effect in known_effects().values():
         if effect.layer == "measurement" or not effect.from_neutral or not effect.could_act(model, sent):
             continue
-        if not free and (not effect.observable_when_fixed or (effect.hidden_by_zeroing and _is_zeroed(evidence))):
+        if not free and (not effect.observable_when_fixed or (effect.hidden_by_zeroing and zeroed)):
             continue
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
@@ -54,10 +55,6 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence], unloaded: Co
                 c = Candidate.of(effect, where, neutral, lowest=effect.lowest(model, where))
                 out.append(replace(c, reach=effect.reach(sdf, model, where)))
     return out
-
-
-def _is_zeroed(evidence: Sequence[TakeEvidence]) -> bool:
-    return all(e.take.recorded.zeroed for e in evidence)
 
 
 def heavy_links(model: RobotModel) -> list[str]:

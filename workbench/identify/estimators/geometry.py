@@ -108,7 +108,7 @@ def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: 
     between = {i: _spans(e, model) for i, e in enumerate(evidence) if e.take.recording.rigid_bodies}
     fixed = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
     ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
-    measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
+    k, measured, near, as_drawn = model.kinematics, list[Measured](), dict[Key, float](), set[Key]()
     for (effect, *_), least, estimates in (
             (lengths, READ_OFF.least_change, _changes(model, [s for there in between.values() for s in there])),
             (turns, READ_OFF.least_turned, _turns(model, fixed))):
@@ -116,16 +116,11 @@ def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: 
         for where, number in estimates.items():
             if number.is_nothing(least):
                 as_drawn.add((name, (where,)))
-            elif number.differs(least) and effect.hidden_by_zeroing and ill & set(
-                    model.kinematics.chain(_child_link(model, where))):
+            elif number.differs(least) and effect.hidden_by_zeroing and ill & set(k.chain(k.frames[where].child)):
                 near[name, (where,)] = number.value / unit
             elif number.differs(least):
                 measured.append(Measured(name, where, number.value / unit, number.sigma / unit))
     return Geometry(tuple(measured), near, frozenset(as_drawn))
-
-
-def _child_link(model: RobotModel, joint: str) -> str:
-    return model.kinematics.frames[joint].child
 
 
 def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:

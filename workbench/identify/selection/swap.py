@@ -86,7 +86,7 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[CandidateFit], takes: t
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
     if not mine or not others:
         return []
-    moves = [_perturb(c, there[c.key]) for c in mine]
+    moves = [there[c.key] + np.diag(steps_of(there[c.key], *c.bounds(), FIT.stride_fixed)) for c in mine]
     probes = [scan(t.candidate, FIT.scanned, walking=False) for t in others]
     asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
     asked += [fit.sizes_without(c.key) for c in mine]
@@ -107,11 +107,6 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[CandidateFit], takes: t
         sets.sort(key=lambda s: s[0])
         out += [chosen for cost, chosen in sets[:SUBSETS.exchanged] if cost < SUBSETS.as_good * sets[0][0]]
     return out
-
-
-def _perturb(c: Candidate, x: Array) -> list[Array]:
-    """Sizes with one number moved at a time."""
-    return list(x + np.diag(steps_of(x, *c.bounds(), FIT.stride_fixed)))
 
 
 def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
