@@ -1,4 +1,4 @@
-"""Channels of rollouts of captured takes, read from the compiled station's log: the numbers of `TakeEvidence.simulated` without a
+"""Channels of rollouts of captured takes, read from the compiled station's log: the numbers of `TakeEvidence.observe` without a
 take, and outside Python's lock. Rollouts that the compiled station does not cover are observed as takes."""
 
 from __future__ import annotations
