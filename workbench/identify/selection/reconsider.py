@@ -1,4 +1,4 @@
-"""Accepted effects reconsidered: as loose links they rattle, fixed-base takes contradict them, or later effects replace them."""
+"""Accepted effects reconsidered: loose links rattle by chance, held takes contradict a number, later effects replace one."""
 
 from __future__ import annotations
 
