@@ -138,7 +138,7 @@ def _refined(mine: Session, evidence: list[TakeEvidence], fit: Fit) -> Ours:
 def _told(evaluator: RolloutEvaluator, fit: Fit) -> Ours:
     (coulomb,), (viscous,) = (c.values(x) for c, x in fit.sizes())
     left = np.sqrt(np.nanmean(np.square(fit.residuals[0] * evaluator.evidence[0].sigma)))
-    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), evaluator.rollouts)
+    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), evaluator.memory.rollouts)
 
 
 def _timed(run: Callable[[], Any]) -> tuple[Any, float]:

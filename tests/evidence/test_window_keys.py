@@ -26,6 +26,6 @@ def test_a_log_that_was_recorded_elsewhere_is_rolled_out_anew(tmp_path):
     for horizon, new in ((np.inf, 0), (0.5, 1)):
         questions = [RolloutRequest(session.model, (0,), horizon=horizon)]
         first.uncorrected(questions)
-        before = second.rollouts
+        before = second.memory.rollouts
         second.uncorrected(questions)
-        assert second.rollouts - before == new
+        assert second.memory.rollouts - before == new

@@ -51,7 +51,7 @@ def test_what_was_tried_when_the_limit_of_work_came_decides(worn, monkeypatch):
     session, search, _ = worn
     pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name == "coulomb_friction"]
     monkeypatch.setattr(forward, "_says_it", lambda *a: False)  # it would ask for more
-    enough = search.evaluator.work + 2 * search.evaluator.seconds
+    enough = search.evaluator.memory.work + 2 * search.evaluator.seconds
     monkeypatch.setattr(forward, "FORWARD", replace(FORWARD, most_work=enough, most_rollouts=0.0))
     chosen = forward.select(search, pool, lambda what, share: None)
     assert chosen.stopped
@@ -122,7 +122,7 @@ def test_what_a_jury_remembers_it_does_not_simulate_again(worn, tmp_path):
     again = RolloutEvaluator(search.evaluator.evidence, CONFIG, n_jobs=1, memory=tmp_path)
     residual = again.residuals([RolloutRequest(session.model, (0,))])[0][0]
     assert (first.memory.played, again.memory.played) == (1, 0)
-    assert first.rollouts == again.rollouts == 1
+    assert first.memory.rollouts == again.memory.rollouts == 1
     np.testing.assert_array_equal(residual, nominal.residuals[0])
 
 
@@ -239,9 +239,9 @@ def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
     pool = {c.key: c for c in candidates(session.model, search.evaluator.evidence)}
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
     zero = Candidate.of(known_effects()["zero_offset"], ("one",), (0.0,))
-    before = search.evaluator.rollouts
+    before = search.evaluator.memory.rollouts
     fit = search.refit(search.evaluate([(first, np.array([1.3])), (second, np.array([0.2]))]), (0,), 1)
-    assert search.evaluator.rollouts - before == 3  # as they are, both moved, where that leads
+    assert search.evaluator.memory.rollouts - before == 3  # as they are, both moved, where that leads
     assert [(s.joint, s.numbers.tolist()) for s in fit.slopes] == [("three", [0]), ("two", [1])]
     assert np.isfinite(np.diag(fit.covariance)).all()
     assert 0.06 + first.values(fit.x[:1])[0] == pytest.approx(HIDDEN, rel=0.1)

@@ -76,9 +76,9 @@ def test_what_is_looked_at_is_where_most_is_missing_and_no_more_than_asked(two, 
 def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(two):
     model, evaluator, residuals = two
     early, never = (e.looked_at(until) for e, until in zip(evaluator.evidence, (1.0, 0.0)))
-    other, before = evaluator.on([early, never]), evaluator.rollouts
+    other, before = evaluator.on([early, never]), evaluator.memory.rollouts
     told = other.residuals([RolloutRequest(model, (0, 1))])[0]
-    assert other.rollouts - before == 1
+    assert other.memory.rollouts - before == 1
     assert np.isnan(told[1]).all()
     assert np.isnan(told[0][early.since > 1.0]).all()
     well_before = early.moving & (early.since < 0.9)

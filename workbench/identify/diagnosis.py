@@ -176,7 +176,7 @@ def _diagnose(session: Session, config: SimulationConfig, settings: _Settings, e
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
         posterior=found.posterior((*build.measured, *found.missed)).in_order(model.effects),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
-        | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
+        | {"seed": 0, "rollouts": evaluator.memory.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | describe_logging([e.take for e in evidence], laws)
         | {"cannot_show": unobservable(session.model, evidence, unloaded)},
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,

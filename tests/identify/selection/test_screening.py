@@ -153,7 +153,7 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
         r[0] for r in evaluator.residuals([RolloutRequest(session.model, (0,)), RolloutRequest(session.model, (0,), until=1.5)])
     )
     length = evidence[0].take.recorded.time[-1]
-    assert evaluator.work == pytest.approx((length + 1.5) / length * evaluator.seconds)
+    assert evaluator.memory.work == pytest.approx((length + 1.5) / length * evaluator.seconds)
     since = evidence[0].since
     known = np.isfinite(brief).any(axis=1)
     assert since[known].max() == pytest.approx(1.5, abs=0.02)
@@ -247,10 +247,10 @@ def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):
     plain = evaluator.residuals([RolloutRequest(session.model, (0,))])[0][0]
     floor = replace(session.model, effects=(EffectSpec("ground_friction", (), {"friction": 0.2}),))
     np.testing.assert_array_equal(evaluator.residuals([RolloutRequest(floor, (0,))])[0][0], plain)
-    assert evaluator.rollouts == 1
+    assert evaluator.memory.rollouts == 1
     worn = replace(session.model, effects=(EffectSpec("coulomb_friction", ("three",), {"torque": 0.1}),))
     assert np.nanmax(np.abs(evaluator.residuals([RolloutRequest(worn, (0,))])[0][0] - plain)) > 1
-    assert evaluator.rollouts == 2
+    assert evaluator.memory.rollouts == 2
 
 
 def test_every_number_of_a_vector_has_its_stretch(quiet):

@@ -96,7 +96,7 @@ class EvidenceOptions:
     fitted for each; refined: fitted moves of one or two effects, led of them sharing their first effect; paired: best moves that
     are also predicted in pairs. most: effects of one joint. seconds: of all takes together that the search uses, from their
     beginnings; finished: of all takes together that the last fit uses, twice as long, as its rollouts have a finer step.
-    most_work [s]: of a puppy's rollouts at the search's step (`RolloutEvaluator.work`), after which a search that is not thorough
+    most_work [s]: of a puppy's rollouts at the search's step (`RolloutMemory.work`), after which a search that is not thorough
     stops: about an hour of one processor, several times the cost of twelve servo logs.
 
     drift: how much a robot that was diagnosed before may have changed; None: the nominal robot is as designed. motion: how a

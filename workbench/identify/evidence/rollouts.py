@@ -62,7 +62,7 @@ class Rollouts:
     """Rolls out hypotheses of all regions. standing: hypotheses used for the others while one region is examined.
     errors: of the time step, which are subtracted; they are measured on `reference`, a model close to the compared ones.
     step: in steps of the search. horizon [s]: of windows, each of which starts from the recorded state. shared: effects of the
-    whole robot, which act in all regions. most_work: limit of the work, as `RolloutEvaluator.work` counts it."""
+    whole robot, which act in all regions. most_work: limit of the work, as `RolloutMemory.work` counts it."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -85,7 +85,7 @@ class Rollouts:
     @property
     def exhausted(self) -> bool:
         """Whether all the work was done that may be."""
-        return math.isfinite(self.most_work) and self.evaluator.work > self.most_work
+        return math.isfinite(self.most_work) and self.evaluator.memory.work > self.most_work
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""

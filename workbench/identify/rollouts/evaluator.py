@@ -43,8 +43,9 @@ class RolloutRequest:
 
 
 class RolloutEvaluator:
-    """Rolls models out on the session's takes and evaluates the residuals. memory: cached rollouts, or a folder in which every
-    rollout is kept, so that a killed run resumes; results are the same with and without."""
+    """Rolls models out on the session's takes and evaluates the residuals. memory: cached rollouts, which count those of every
+    evaluator that shares them, or a folder in which every rollout is kept, so that a killed run resumes; results are the same
+    with and without."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | RolloutMemory | None = None) -> None:
@@ -55,16 +56,6 @@ class RolloutEvaluator:
         self._take_keys: dict[int, str] = {}
         self._state_keys: dict[tuple[int, float], str] = {}
         self._model_keys = ModelKeys()
-
-    @property
-    def rollouts(self) -> int:
-        """Distinct rollouts that were requested so far, of this evaluator and of those that share its memory."""
-        return self.memory.rollouts
-
-    @property
-    def work(self) -> float:
-        """Seconds of a puppy's rollouts requested so far, at the search's step; likewise."""
-        return self.memory.work
 
     def residuals(self, questions: Sequence[RolloutRequest], corrected: bool = True) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take; NaN where a take is not looked at. corrected: for the search's step."""

@@ -94,7 +94,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         trials: list[CandidateFit] = []
         likely = pool
         for tier in range(SCHEDULING.tiers_of_all if closed > ACCEPTANCE.least_closed else SCHEDULING.tiers):
-            stopped = search.evaluator.work > most_work
+            stopped = search.evaluator.memory.work > most_work
             if stopped:
                 break
             groups, on = groups_to_try(search, likely, current, beyond, takes, tier)
