@@ -74,7 +74,8 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     turned = recalibrate(model, {numbers["zero"]: -1.0})
     assert turned.effects[0].effect == "zero_offset"
     assert turned.effects[0].parameters["angle"] == pytest.approx(-np.degrees(numbers["zero"].sd))
-    (said, other) = list_changes(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
+    z = {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0}
+    (said, other) = list_changes(model, start(tuple(z)).at(np.array(list(z.values()))))
     assert (said.number, other.number) == ("back_emf", "coulomb_friction")
     assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
     assert (said.at_end, other.at_end) == (True, False)
