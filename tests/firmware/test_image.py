@@ -234,6 +234,27 @@ def test_flips_in_both_directions_stop_nothing_and_every_goal_is_put_right() -> 
     flips(8)
 
 
+def test_a_length_that_is_spoilt_on_the_way_silences_no_servo_for_long() -> None:
+    """Servos take what follows for the rest of a packet, here of 128 bytes more: as many as 17 questions have, with no pose among
+    them, after which the supply would be thought dead."""
+    robot = Robot()
+    robot.play()
+    last = bytearray(3)
+    spoilt = []
+
+    def line(value: int) -> int:
+        spoil = not spoilt and bytes(last[:2]) == b"\xff\xff" and last[2] < 0xFE and value == 4
+        last[:] = *last[1:], value
+        spoilt.extend([robot.clock.now] * spoil)
+        return value ^ 0x80 if spoil else value
+
+    robot.bus.to_servos = line
+    robot.run(400)
+    assert spoilt
+    assert not [m for m in robot.messages() if isinstance(m, StateMessage) and m.state == ControllerState.LIMP]
+    assert [len(data) for _, data in robot.ear.packets if not any(data)] == [128]
+
+
 @pytest.mark.slow
 def test_flips_for_ten_minutes() -> None:
     flips(600)
