@@ -11,6 +11,7 @@ from tests.plug_in import install_plug_in
 from workbench.effects.apply import apply_to_commands, apply_to_measurement, physics_of
 from workbench.effects.base import Effect, si_values
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
+from workbench.effects.schedules import delay_commands, delay_each
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement
@@ -121,6 +122,26 @@ def test_a_delay_of_one_joint_moves_its_goals_alone(commands, delay):
     first = np.argmax(late.goals[:, 1] != 0)
     assert late.times[first] == pytest.approx(delay, abs=1e-12)
     assert late.speeds[first, 1] == commands.speeds[0, 1]
+
+
+@pytest.mark.parametrize("begun", [True, False])
+@pytest.mark.parametrize("late", [(0.018, 0.0213), (0.0, 0.03), (0.1, 0.15)], ids=["apart", "one", "on other commands"])
+def test_servos_that_hear_their_goals_at_different_times_do_as_if_delayed_one_by_one(commands, late, begun):
+    """In one pass, as a search delays each joint of a robot by another time in every rollout."""
+    sent = replace(commands, begun=begun)
+    one_by_one = delay_commands(delay_commands(sent, [0], late[0]), [1], late[1])
+    at_once = delay_each(sent, np.array(late))
+    for name in ("times", "goals", "speeds", "enabled", "poses"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(one_by_one, name))
+    assert at_once.end == pytest.approx(0.6 + max(late))
+
+
+def test_what_is_sent_after_the_end_of_a_run_is_not_delayed(commands):
+    whole, needed = (delay_each(commands, np.array([0.018, 0.0213]), until) for until in (np.inf, 0.3))
+    heard = needed.times < 0.3
+    assert 0 < len(needed.times) < len(whole.times)
+    np.testing.assert_array_equal(needed.times[heard], whole.times[:heard.sum()])
+    np.testing.assert_array_equal(needed.goals[heard], whole.goals[:heard.sum()])
 
 
 def test_one_joint_may_be_later_than_all_are(commands):

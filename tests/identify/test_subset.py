@@ -16,7 +16,7 @@ from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.options import PROBLEM
 from workbench.identify.preparation import gather, prepare
 from workbench.identify.problem import part_of
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, servo_logs
 from workbench.identify.rollouts.servo_logs import most_together
 from workbench.identify.subset import at_most, data_subset, floors_everywhere, rebalance, subset_used
 from workbench.robot import EffectSpec
@@ -179,6 +179,20 @@ def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones
                for e, w in zip(shorter, evidence))
     judging = replace(evidence[1], uses=dict.fromkeys(evidence[1].uses, np.zeros(len(evidence[1].recorded), dtype=bool)))
     assert [e.until for e in at_most([evidence[0], judging], 2.0)] == pytest.approx([2.0, 0.0])
+
+
+def test_commands_of_a_log_are_put_in_the_models_order_once(tmp_path, monkeypatch):
+    """What is derived from commands is kept by the object."""
+    model, told = arm(tmp_path), goals(1.0)
+    takes, _ = read_takes(log_session(tmp_path, measured(told, played(model, told, ()), seed=1)))
+    (e,) = prepare(load_session(tmp_path / "session.yaml"), takes, CONFIG, 1, lambda what, done: None).evidence
+    other = e.played(e.take.commands.reordered(model.joints[::-1]))
+    jobs = []
+    monkeypatch.setattr(servo_logs, "servo_angles", lambda models: jobs.extend(m[0] for m in models) or [[] for _ in models])
+    servo_logs.log_angles([other], CONFIG, [(RolloutRequest(model, (0,)), (0,))] * 2)
+    first, second = jobs
+    assert first.commands is second.commands
+    assert first.commands.joints == model.joints
 
 
 def test_of_a_logs_nominal_rollout_only_the_rows_of_the_log_are_kept(tmp_path):

@@ -126,6 +126,14 @@ def test_robots_with_play_are_put_back_in_lanes_as_each_is_alone(arm, calls):
     assert calls.lanes == 2
 
 
+def test_robots_whose_servos_hear_goals_later_play_together(arm, calls):
+    """A fit moves the delay of every servo, so that hardly two robots hear their goals in the same step."""
+    late = [arm.with_physics({j: arm.servo(j).updated({"goal_delay": delay, "command_filter": 0.01 * (k % 2)})
+                              for j, delay in zip(arm.joints, (0.003 * k, 0.02 - 0.002 * k))}, ()) for k in range(LANES)]
+    assert largest_difference(jobs_of(late, swings(arm))) < SAME
+    assert calls.lanes == 2
+
+
 def test_robots_with_torque_tables_play_alone(arm, calls):
     tables = [TorqueTable("angle", (-1.0, 0.0, 1.0), (size, -size, size)) for size in (0.05, 0.1, 0.15)]
     models = [arm.with_servos({"torque_tables": (table,)}) for table in tables]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from workbench.cache import Cache
 from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
-from workbench.effects.schedules import delay_commands
+from workbench.effects.schedules import delay_commands, delay_each
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
@@ -150,15 +151,43 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
     return np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=np.int64)
 
 
+@dataclass(frozen=True)
+class Hearing:
+    """How a robot's servos hear commands: late (n,) [s]: their goals, by the nominal law, in the model's order; changes: by
+    effects, with the places and values of each."""
+
+    model: RobotModel
+    late: Array
+    changes: tuple[tuple[Effect, tuple[str, ...], dict[str, float]], ...]
+
+    @classmethod
+    def of(cls, model: RobotModel) -> Hearing:
+        """A model's."""
+        late = np.array([model.servo(j).goal_delay for j in model.joints])
+        changes = ((effect, spec.where, values) for effect, spec, values in resolve(model))
+        return cls(model, late, tuple(c for c in changes if type(c[0]).commands is not Effect.commands))
+
+    def heard(self, commands: Commands, until: float = math.inf) -> Commands:
+        """The commands on which the servos act: those that were sent, with goals delayed according to the nominal law, and
+        changed by effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off.
+        until [s]: what comes later matters to nobody, and is left out where no effect may bring it forward."""
+        until = math.inf if self.changes else until
+        joints = self.model.joints
+        late = self.late if commands.joints == joints else self.late[[joints.index(j) for j in commands.joints]]
+        delays = set(late[late > 0].tolist())
+        if len(delays) == 1:
+            (delay,) = delays
+            commands = delay_commands(commands.until(until), np.flatnonzero(late == delay).tolist(), delay, switched=False)
+        elif delays:
+            commands = delay_each(commands, late, until)
+        for effect, where, values in self.changes:
+            commands = effect.commands(commands, where, values, self.model)
+        return commands
+
+
 def apply_to_commands(commands: Commands, model: RobotModel) -> Commands:
-    """The commands on which the servos act: those that were sent, with goals delayed according to the nominal law, and changed by
-    effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off."""
-    late = np.array([model.servo(j).goal_delay for j in commands.joints])
-    for delay in np.unique(late[late > 0]).tolist():
-        commands = delay_commands(commands, np.flatnonzero(late == delay).tolist(), delay, switched=False)
-    for effect, spec, values in resolve(model):
-        commands = effect.commands(commands, spec.where, values, model)
-    return commands
+    """The commands on which a model's servos act (`Hearing`)."""
+    return Hearing.of(model).heard(commands)
 
 
 def apply_to_measurement(measurement: Measurement, model: RobotModel) -> Measurement:

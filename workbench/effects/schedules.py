@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from workbench.cache import Cache
 from workbench.motion.commands import Commands
+from workbench.types import Array
 
 LOOP = 2e-3
 """Uncertainty of the delay between a command's time stamp and its use in the servo's loop [s]. Simulators and firmwares differ by
@@ -61,6 +66,56 @@ def delay_commands(commands: Commands, columns: Iterable[int], late: float, swit
 
     return Commands(times, commands.joints, hold(commands.goals, 0.0), hold(commands.speeds, 0.0),
                     hold(commands.enabled, True, switched), commands.end + late, commands.poses[first], commands.begun)
+
+
+class _Sent(NamedTuple):
+    """What a joint is sent: times (k,) [s]: when that changes; values (2, k + 1): goals and speeds, first those before."""
+
+    times: Array
+    values: Array
+
+
+def delay_each(commands: Commands, late: Array, until: float = math.inf) -> Commands:
+    """The commands with the goals and speeds of each joint `late` (n,) seconds later, none negative, as `delay_commands` has
+    those of one delay after the other; servos are switched on and off as before. In one pass, since a search delays each of
+    a robot's joints by another time in every rollout. until [s]: of what is sent later nothing is needed."""
+    commands, sent = _sent_to_each.get((id(commands), until), lambda: _changes(commands.until(until)), commands)
+    heard = [each.times + wait for each, wait in zip(sent, late.tolist())]
+    times = np.concatenate([commands.times, *heard])
+    times.sort()
+    kept = np.ones(len(times), dtype=bool)
+    np.greater(times[1:] - times[:-1], SAME, out=kept[1:])
+    times = times[kept]
+    values = np.empty((2, len(commands.joints), len(times)))
+    for i, (each, instants) in enumerate(zip(sent, heard)):
+        values[:, i] = each.values.repeat(_lasting(instants, times), axis=1)
+    now = np.arange(len(commands.times)).repeat(_lasting(commands.times, times)[1:])
+    goals, speeds = (np.ascontiguousarray(v.T) for v in values)
+    return Commands(times, commands.joints, goals, speeds, commands.enabled[now], commands.end + float(late.max()),
+                    commands.poses[now], commands.begun)
+
+
+_sent_to_each: Cache[tuple[Commands, list[_Sent]]] = Cache(256)
+
+
+def _changes(commands: Commands) -> tuple[Commands, list[_Sent]]:
+    out = []
+    for goals, speeds in zip(commands.goals.T, commands.speeds.T):
+        values = np.array([goals, speeds])
+        before = values[:, :1] if commands.begun else np.zeros((2, 1))  # in neutral
+        rows = np.flatnonzero((np.diff(values, axis=1, prepend=before) != 0).any(axis=0))
+        out.append(_Sent(commands.times[rows], np.hstack([before, values[:, rows]])))
+    return commands, out
+
+
+def _lasting(instants: Array, times: Array) -> NDArray[np.int_]:
+    """How many of `times` (N,) come before the first of some instants (k,) among them, and from each on until the next: (k + 1,).
+    """
+    counts = np.empty(len(instants) + 1, dtype=int)
+    counts[:-1] = times.searchsorted(instants + SAME, side="right") - 1
+    counts[-1] = len(times)
+    counts[1:] -= counts[:-1].copy()
+    return counts
 
 
 def _since(commands: Commands, time: float) -> Commands:

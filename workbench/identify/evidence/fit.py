@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from scipy.linalg import hadamard
 
-from workbench.identify.evidence.hypothesis import Hypothesis, Prior, Term, log_odds
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, Term, log_odds, split_sums
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
 from workbench.types import Array
@@ -85,7 +85,9 @@ def _at_least(H: Array, prior: Array) -> Array:
 
 def evaluate(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, law_slopes: Array | None = None
              ) -> Fitted:
-    """A hypothesis with its evidence at its own parameters. law_slopes (n, m): slopes by the weights of its unnamed torque."""
+    """A hypothesis with its evidence at its own parameters, sums split by the prior (`split_sums`). law_slopes (n, m): slopes by
+    the weights of its unnamed torque."""
+    h, J = split_sums(h, J, options)
     prior = Prior.of(h, options)
     density, precision, slopes = prior.log(h.theta), prior.precision(h.theta), J
     parts = len(h.effects) + sum(len(c.options) for c in h.effects)

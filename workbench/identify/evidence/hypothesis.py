@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -13,7 +14,7 @@ from scipy.special import gammaln, stdtrit
 
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.robot import EffectSpec
 from workbench.types import Array, Mask
 
@@ -27,6 +28,8 @@ UNNAMED = "unknown torque"
 """Represents a torque law among the terms of a hypothesis."""
 ZERO = "zero"
 """Name of a joint's zero among the numbers that are recalibrated."""
+SUM_OF = {"dead_zone": "margin", "minimum_duty": "punch_duty"}
+"""Numbers that are summands of the constant to which effects add."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -42,22 +45,25 @@ def zero_effect() -> Effect:
 class Uncertain:
     """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
     deviations make it nominal · exp(sd z), and a zero of sd z. others: the constants that change with it, and their change for
-    each standard deviation, where an earlier diagnosis knew only a combination; all z are still independent in the prior."""
+    each standard deviation, where an earlier diagnosis knew only a combination; all z are still independent in the prior.
+    nominal [SI]: the nominal value, where an effect adds to the constant."""
 
     joint: str
     name: str
     sd: float
     others: tuple[tuple[str, float], ...] = ()
+    nominal: float = math.nan
 
     @property
     def changes(self) -> dict[str, float]:
         """How far one standard deviation moves each number: the logarithm of it, [rad] of ZERO."""
         return {self.name: self.sd, **dict(self.others)}
 
-    @property
-    def effect(self) -> str:
-        """Name of the effect that adds to the same constant, if there is one."""
-        return zero_effect().name if self.name == ZERO else self.name
+    def is_changed_by(self, effect: Effect) -> bool:
+        """Whether an effect changes the same constant."""
+        if self.name == ZERO:
+            return effect == zero_effect()
+        return effect.name == self.name or any(p.adds_to == SUM_OF.get(self.name, self.name) for p in effect.parameters)
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
@@ -109,11 +115,9 @@ class Hypothesis:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def alike(self) -> list[list[int]]:
-        """Pairs of theta that represent one constant of the law: its recalibration, and the effect of that name there."""
-        at: dict[tuple[str, tuple[str, ...]], int] = {
-            (n.effect, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
-        both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
-        return [[k, s.start] for k, s in both if k is not None]
+        """Pairs of theta that represent one constant of the law: its recalibration, and the effect that changes it there."""
+        return [[k, s.start] for c, s in zip(self.effects, self.slices()) for k, n in enumerate(self.numbers)
+                if c.size == 1 and c.where == (n.joint,) and not n.others and n.is_changed_by(c.effect)]
 
     def sizes(self) -> list[tuple[Candidate, Array]]:
         """Each effect with its part of theta."""
@@ -149,6 +153,23 @@ class Hypothesis:
         n = len(self.numbers)
         ends = [(np.full(n, -FAR), np.full(n, FAR)), *(c.bounds() for c in self.effects)]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    def constant(self, k: int, z: Array | float) -> Array:
+        """The constant that number k recalibrates, at z standard deviations of it [SI]; NaN where its nominal value is not
+        given."""
+        n = self.numbers[k]
+        if n.name == ZERO:
+            return np.asarray(n.sd * np.asarray(z))
+        by_others = sum(x * other.changes.get(n.name, 0.0) for j, (other, x) in enumerate(zip(self.numbers, self.z))
+                        if j != k and other.joint == n.joint)
+        return np.asarray(n.nominal * np.exp(by_others + n.sd * np.asarray(z)))
+
+    def adds(self, i: int, to: int) -> float:
+        """What a unit of the effect's size that is number i of theta adds to the constant of number `to` [SI]; NaN where it
+        changes it otherwise."""
+        c = next(c for c, s in zip(self.effects, self.slices()) if s.start == i)
+        adds = c.parameters[0].adds_to or self.numbers[to].name == ZERO
+        return (c.typical[0] - c.neutral[0]) * c.parameters[0].si if adds else math.nan
 
 
 @dataclass(frozen=True)
@@ -192,6 +213,30 @@ class Prior:
         z = (theta - self.center) / self.scale
         v = self.freedom
         return np.asarray(np.where(self.normal, 1.0, (v + 1) / (v + z * z)) / np.square(self.scale))
+
+
+def split_sums(h: Hypothesis, J: Array, options: EvidenceOptions) -> tuple[Hypothesis, Array]:
+    """The hypothesis with each constant that is recalibrated, and to which an effect adds, split between the two where the prior
+    is largest, which changes no residual; and J (n, k), the residuals' slopes by theta, there.
+
+    Along this line the likelihood is constant, and a fit stops anywhere on it. But evidence compares the best of each model, and
+    a constant recalibrated to its limit would leave the effect too little to be told from nothing."""
+    for k, i in h.alike():
+        unit, here = h.adds(i, k), h.theta[k]
+        total, factor = h.constant(k, here) + unit * h.theta[i], h.numbers[k].name != ZERO
+        if not np.isfinite(total) or (factor and total <= 0):
+            continue  # the effect takes away all that there is: more of it changes nothing
+        each = np.linspace(-FAR, FAR, NUMERICS.splits)
+        theta = np.tile(h.theta, (len(each) + 1, 1))
+        theta[1:, k], theta[1:, i] = each, (total - h.constant(k, each)) / unit
+        low, high = h.bounds()
+        possible = (theta[:, i] >= low[i]) & (theta[:, i] <= high[i])
+        cost = np.square(Prior.of(h, options).rows(theta)[:, [k, i]]).sum(axis=1)
+        best = theta[np.argmin(np.where(possible, cost, np.inf))]
+        if factor:
+            J = J * np.where(np.arange(len(best)) == k, h.constant(k, best[k]) / h.constant(k, here), 1.0)
+        h = h.at(best)
+    return h, J
 
 
 def log_odds(names: int, expected: float) -> float:

@@ -42,8 +42,8 @@ def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThe
     known = (np.diag([0.0 if name == ZERO else servo.share_known(name)**2 for name in names]) if servo.covariance is None
              else servo.covariance.among(names))
     L = np.linalg.cholesky(known + np.diag([drift.of(name)**2 for name in names]))
-    return [Uncertain(joint, name, float(L[k, k]), tuple((names[i], float(L[i, k])) for i in range(k + 1, len(names)) if L[i, k]))
-            for k, name in enumerate(names)]
+    return [Uncertain(joint, name, float(L[k, k]), tuple((names[i], float(L[i, k])) for i in range(k + 1, len(names)) if L[i, k]),
+                      _in_si(servo, name)) for k, name in enumerate(names)]
 
 
 def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
@@ -54,8 +54,9 @@ def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float 
     shares = {name: servo.share_known(name) for name in UNITS if name != ZERO}
     shares |= {name: sheet for name, (tolerance, keys) in OF_SHEET.items()
                if getattr(servo, tolerance) is None and not set(keys) & set(dict(servo.sd))}
-    out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and nominal_value(servo, name) > 0]
-    return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
+    out = [Uncertain(joint, name, share, nominal=_in_si(servo, name)) for name, share in shares.items()
+           if share > 0 and nominal_value(servo, name) > 0]
+    return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD, nominal=0.0)]
 
 
 def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
@@ -118,6 +119,10 @@ def with_whole_zeros(model: RobotModel) -> RobotModel:
 def nominal_value(servo: ServoConstants, name: str) -> float:
     """The nominal value of one of UNITS, ZERO apart."""
     return float(getattr(servo, name))
+
+
+def _in_si(servo: ServoConstants, name: str) -> float:
+    return 0.0 if name == ZERO else nominal_value(servo, name) * (math.radians(1) if UNITS[name].startswith("deg") else 1.0)
 
 
 @lru_cache(maxsize=256)  # most models that are compared differ in one number of one servo

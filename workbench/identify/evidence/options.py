@@ -172,7 +172,8 @@ class EvidenceNumerics:
     a discrepancy's size; a hundred samples determine it to a twentieth. window: correlation times over which an autocorrelation
     is summed (Sokal). gain [nats]: a fit of all joints ends when a step gains less; shares: fractions of a step that are tried.
     first: an effect of the whole robot goes first if it explains at least this share of the gain of the best effects of all
-    joints; the complete search of both decides between them. """
+    joints; the complete search of both decides between them. splits: ways that are tried to split a constant between its
+    recalibration and an effect, a two-hundredth of a standard deviation apart. """
 
     fine: float = 0.5
     rounds: int = 4
@@ -181,6 +182,7 @@ class EvidenceNumerics:
     gain: float = 0.1
     shares: tuple[float, ...] = (1.0, 0.5, 0.25)
     first: float = 0.5
+    splits: int = 1201
 
 
 NUMERICS = EvidenceNumerics()

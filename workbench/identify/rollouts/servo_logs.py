@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from workbench.cache import Cache
 from workbench.identify.options import PROBLEM
 from workbench.identify.rollouts.windows import recorded_states
+from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
@@ -78,7 +80,16 @@ def _jobs(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationCo
         as_it_was = spec.conditions
         models.setdefault(as_it_was, spec.robot(model))
         times = e.since[frames(e)]
-        jobs.append(Job(models[as_it_was], config, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
+        sent = None if e.take.commands is None else _in_order(e.take.commands, model.joints)
+        jobs.append(Job(models[as_it_was], config, sent, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
                         start=e.take.start_state(),
                         restarts=None if math.isinf(horizon) else recorded_states(e.take, horizon)))
     return jobs
+
+
+_ordered: Cache[Commands] = Cache(PROBLEM.states_kept)
+
+
+def _in_order(commands: Commands, joints: tuple[str, ...]) -> Commands:
+    """`Commands.reordered`, the same object for the same commands: what is derived from them is kept by that."""
+    return _ordered.get((id(commands), joints), lambda: commands.reordered(joints), commands)

@@ -41,8 +41,8 @@ _readings: Cache[_Reading] = Cache(KEPT)
 def servo_angles(models: Sequence[Sequence[Job]], in_lanes: bool = True) -> list[list[Array] | NotCoveredError]:
     """For each model, of each of its jobs the angles (M, n) [rad] of the servos at the job's `times`, as their own sensors tell
     them, NaN outside the run; or the reason why one of the jobs has to be Drake's. Jobs of one model share its arrays. Robots of
-    one structure play together, in lanes (`joint_angles`), where their jobs have the same commands, states to be put to and
-    configuration: the same objects. in_lanes: as there."""
+    one structure play together, in lanes (`joint_angles`), where their jobs have the same states to be put to (one object), times
+    and configuration. in_lanes: as there."""
     made = [_made(jobs) for jobs in models]
     plays = [(compiled, _schedule(compiled)) for each in made if not isinstance(each, NotCoveredError) for compiled in each]
     played = iter(joint_angles(plays, in_lanes))

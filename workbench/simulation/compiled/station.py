@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import numpy as np
 from pydrake.math import RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from workbench.effects.apply import Physics, apply_to_commands, physics_of
+from workbench.effects.apply import Hearing, Physics, physics_of
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
@@ -117,12 +118,14 @@ class CompiledJob:
         self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step, apart)
         self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
         self._work: dict[int, Work] = {}  # likewise, by thread: jobs made by `of` are played at the same time
+        self.hearing = Hearing.of(self.model) if self.physics.retimed else None
         self.plan = self._plan()
 
     def _plan(self) -> _Plan:
         job = self.job
         sent = None if job.commands is None else job.commands.reordered(self.model.joints)
-        commands = apply_to_commands(sent, self.model) if sent is not None and self.physics.retimed else sent
+        until = math.inf if job.duration is None else job.duration
+        commands = self.hearing.heard(sent, until) if sent is not None and self.hearing is not None else sent
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")

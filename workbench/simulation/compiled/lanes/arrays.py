@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.simulation.compiled.arrays import Numbers, Servos, State, Tree
+from workbench.simulation.compiled.arrays import Ints, Numbers, Schedule, Servos, State, Tree
 from workbench.simulation.compiled.number import LANES
 from workbench.types import Array
 
@@ -134,6 +134,22 @@ def _lengthened(rows: Array, count: int, by: float) -> Array:
     """As many rows as `count`, those that are missing full of one number."""
     missing = count - len(rows)
     return np.concatenate([rows, np.full((missing, *rows.shape[1:]), by)]) if missing else rows
+
+
+def schedules_in_lanes(schedules: Sequence[Schedule]) -> tuple[Schedule, Ints, Ints]:
+    """Of up to LANES robots, schedules that differ in their commands alone: with the commands of all one after the other; the
+    first of each lane (LANES,), and behind its last. Lanes that are left over do as the last robot does."""
+    own = list({id(s): s for s in schedules}.values())
+    ends = np.cumsum([len(s.command_step) for s in own])
+    which = [next(k for k, s in enumerate(own) if s is mine) for mine in schedules]
+    which += which[-1:] * (LANES - len(which))
+    end = np.array([ends[k] for k in which], dtype=np.int64)
+    first = np.array([ends[k] - len(own[k].command_step) for k in which], dtype=np.int64)
+    if len(own) == 1:
+        return own[0], first, end
+    commands: dict[str, Any] = {name: np.concatenate([getattr(s, name) for s in own])
+                                for name in ("command_step", "late", "goal", "speed", "on")}
+    return own[0]._replace(**commands), first, end
 
 
 def states_in_lanes(states: Sequence[State]) -> State:

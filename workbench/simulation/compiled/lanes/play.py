@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from workbench.simulation.compiled.arrays import Schedule, Shapes, State, Tree
+from workbench.simulation.compiled.arrays import Ints, Schedule, Shapes, State, Tree
 from workbench.simulation.compiled.kernel import kernel, part
 from workbench.simulation.compiled.lanes.arrays import LaneServos, Lost, Room
 from workbench.simulation.compiled.lanes.links import touching
@@ -52,14 +52,15 @@ def _wide_room(w: Room) -> Any:  # of the attributes of `Work` that steps of a h
 
 
 @kernel
-def play_lanes(trees: Tree, bank: LaneServos, shapes: Shapes, schedule: Schedule, states: State, q: Array, lost: Lost, rooms: Room
-               ) -> None:
-    """Plays a schedule from states on, as `run`, into q (LANES, rows, n) [rad]. lost (LANES,): lanes whose numbers are not to be
-    used, as links touched or a step was not solved."""
+def play_lanes(trees: Tree, bank: LaneServos, shapes: Shapes, schedule: Schedule, at: Ints, end: Ints, states: State, q: Array,
+               lost: Lost, rooms: Room) -> None:
+    """Plays a schedule from states on, as `run`, into q (LANES, rows, n) [rad]. at, end (LANES,): the first command of each lane,
+    and behind its last; at moves on. lost (LANES,): lanes whose numbers are not to be used, as links touched or a step was not
+    solved."""
     tree, servos, state, w = _wide_tree(trees), _wide_servos(bank), _wide_state(states), _wide_room(rooms)
     n, dt = tree.parent.shape[0], schedule.dt
     gone = wide(0.0) > wide(0.0)
-    commands = puts = 0
+    puts = 0
     for k in range(schedule.steps + 1):
         if k % schedule.log_every == 0 and k // schedule.log_every < q.shape[1]:
             for i in range(n):
@@ -68,9 +69,7 @@ def play_lanes(trees: Tree, bank: LaneServos, shapes: Shapes, schedule: Schedule
         while puts < schedule.put_step.shape[0] and schedule.put_step[puts] == k:
             put_servos(servos, schedule, puts, state)
             puts += 1
-        while commands < schedule.command_step.shape[0] and schedule.command_step[commands] == k:
-            command(schedule, commands, servos, state)
-            commands += 1
+        command(schedule, k, at, end, bank, states)
         if k == schedule.steps:
             break
         place_bodies(tree, state, w)

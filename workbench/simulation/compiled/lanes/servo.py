@@ -8,42 +8,64 @@ from __future__ import annotations
 import math
 
 from workbench.servo.term_bank import LOAD_SMOOTHING, MOVING
-from workbench.simulation.compiled.arrays import Schedule, State, Tree
+from workbench.simulation.compiled.arrays import Ints, Schedule, State, Tree
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.lanes.arrays import LaneServos, Room
-from workbench.simulation.compiled.number import Wide, exponential, least, most, where, wide, with_sign, within
+from workbench.simulation.compiled.number import LANES, Wide, exponential, least, most, where, wide, with_sign, within
 
 _SMOOTHING, _MOVING = float(LOAD_SMOOTHING), float(MOVING)
 
 
 @part
-def command(schedule: Schedule, k: int, servos: LaneServos, state: State) -> None:
-    """Command number k comes; one that comes between two steps ramps from then on."""
-    share = schedule.late[k] / schedule.dt
-    if share > 0.0:
-        _shift_ramp(servos, state, schedule.late[k], share, -1.0)
-    for i in range(state.goal.shape[0]):
-        state.goal[i] = schedule.goal[k, i] + servos.zero[i]
-        reach = schedule.speed[k, i] * schedule.dt if schedule.speed[k, i] > 0.0 else math.inf
-        state.reach[i] = least(reach, servos.ramp[i] * schedule.dt)
-        state.on[i] = schedule.on[k, i]
-    if share > 0.0:
-        _shift_ramp(servos, state, schedule.late[k], share, 1.0)
+def command(schedule: Schedule, k: int, at: Ints, end: Ints, bank: LaneServos, states: State) -> None:
+    """The commands of step k, in each lane its own: at (LANES,): the next of each, which moves on; end (LANES,): behind its last.
+    One that comes between two steps ramps from then on. Servos are switched on or off in all lanes at once."""
+    due = True
+    while due:
+        due = False
+        for l in range(LANES):
+            if at[l] < end[l] and schedule.command_step[at[l]] == k:
+                due = True
+                _hear(schedule, at[l], bank, states, l)
+        for l in range(LANES):
+            if at[l] < end[l] and schedule.command_step[at[l]] == k:
+                for i in range(states.goal.shape[0]):
+                    states.on[i] = schedule.on[at[l], i]
+                if schedule.late[at[l]] > 0.0:
+                    _ramp_on(schedule.late[at[l]], schedule.late[at[l]] / schedule.dt, bank, states, l)
+                at[l] += 1
 
 
 @part
-def _shift_ramp(servos: LaneServos, state: State, late: float, share: float, sign: float) -> None:
-    for i in range(state.goal.shape[0]):
-        slow = servos.lag[i] > 0.0
-        goal = where(slow, _lagging(servos, i, state, late) if sign > 0.0 else state.lagging[i], state.goal[i])
-        if state.on[i]:
-            reach = state.reach[i] * share
-            state.reference[i] += sign * within(goal - state.reference[i], -reach, reach)
-        if sign > 0.0:
-            state.lagging[i] = goal
-        else:
-            passed = 1.0 - exponential(-late / servos.lag[i])
-            state.lagging[i] = where(slow, (state.lagging[i] - passed * state.goal[i]) / (1.0 - passed), state.lagging[i])
+def _hear(schedule: Schedule, c: int, bank: LaneServos, states: State, l: int) -> None:
+    """Lane l takes the goals and speeds of command number c; what it has ramped since then is taken back."""
+    late = schedule.late[c]
+    share = late / schedule.dt
+    for i in range(states.goal.shape[0]):
+        goal, lag = states.goal[i, l], bank.lag[i, l]
+        if share > 0.0:
+            if states.on[i]:
+                behind, reach = (states.lagging[i, l] if lag > 0.0 else goal) - states.reference[i, l], states.reach[i, l] * share
+                states.reference[i, l] -= min(max(behind, -reach), reach)
+            if lag > 0.0:
+                passed = 1.0 - math.exp(-late / lag)
+                states.lagging[i, l] = (states.lagging[i, l] - passed * goal) / (1.0 - passed)
+        states.goal[i, l] = schedule.goal[c, i] + bank.zero[i, l]
+        reach = schedule.speed[c, i] * schedule.dt if schedule.speed[c, i] > 0.0 else math.inf
+        states.reach[i, l] = min(reach, bank.ramp[i, l] * schedule.dt)
+
+
+@part
+def _ramp_on(late: float, share: float, bank: LaneServos, states: State, l: int) -> None:
+    """Lane l ramps to its goals for so long [s]."""
+    for i in range(states.goal.shape[0]):
+        goal, lag = states.goal[i, l], bank.lag[i, l]
+        if lag > 0.0:
+            goal = states.lagging[i, l] + (1.0 - math.exp(-late / lag)) * (goal - states.lagging[i, l])
+        if states.on[i]:
+            reach = states.reach[i, l] * share
+            states.reference[i, l] += min(max(goal - states.reference[i, l], -reach), reach)
+        states.lagging[i, l] = goal
 
 
 @part

@@ -1,4 +1,4 @@
-"""Runs of many held robots: those of one structure that play one schedule in lanes, the others one by one."""
+"""Runs of many held robots: those of one structure in lanes, the others one by one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from workbench.simulation.compiled.lanes.arrays import (
     Lost,
     Room,
     room_for,
+    schedules_in_lanes,
     servos_in_lanes,
     state_of_lane,
     states_in_lanes,
@@ -43,10 +44,11 @@ class _Robots(NamedTuple):
 def joint_angles(plays: Sequence[Play], in_lanes: bool = True) -> list[Array | NotCoveredError]:
     """Angles (rows, n) [rad] of all joints at the rows of each run's log, or why it has to be Drake's.
 
-    In lanes go held robots without torque tables, those of one structure on one schedule together: they may differ in
-    masses, springs, play, limits, friction, gravity and in all that servos do. A lane in which links touch is played again alone.
-    Who plays along changes no bit of a robot's angles, so that even one is played in lanes. in_lanes: False plays each alone, by
-    the kernel of one robot; angles are the same to rounding. On a processor without vectors they are, too, but nothing is gained.
+    In lanes go held robots without torque tables, those of one structure that are put to the same states together: they may
+    differ in masses, springs, play, limits, friction, gravity, in all that servos do, and in what they are told when. A lane in
+    which links touch is played again alone. Who plays along changes no bit of a robot's angles, so that even one is played in
+    lanes. in_lanes: False plays each alone, by the kernel of one robot; angles are the same to rounding. On a processor without
+    vectors they are, too, but nothing is gained.
     """
     out: list[Array | NotCoveredError | None] = [None] * len(plays)
     robots: dict[tuple[int, ...], _Robots] = {}
@@ -56,7 +58,7 @@ def joint_angles(plays: Sequence[Play], in_lanes: bool = True) -> list[Array | N
         if key not in robots:
             trees, servos = trees_in_lanes([c.machine.tree for c in chunk]), servos_in_lanes([c.machine.servos for c in chunk])
             robots[key] = _Robots(trees, servos, chunk[0].machine.shapes, room_for(trees, servos))
-        for k, q in zip(here, _played(chunk, plays[here[0]][1], robots[key])):
+        for k, q in zip(here, _played(chunk, [plays[k][1] for k in here], robots[key])):
             out[k] = q
     return [_alone(*play) if q is None else q for play, q in zip(plays, out)]
 
@@ -75,7 +77,7 @@ def _in_step(plays: Sequence[Play]) -> Iterator[list[int]]:
         tree, servos, shapes = job.machine
         if not tree.free and not len(servos.table_servo):
             structure = [a.tobytes() for a in (tree.parent, tree.path, tree.group, servos.joint, *shapes)]
-            kind = id(schedule), job.rows, servos.terms, *structure  # terms have a servo that is off brake otherwise
+            kind = _when(job, schedule), job.rows, servos.terms, *structure  # terms have a servo that is off brake otherwise
             groups.setdefault(kind, []).append(k)
     for group in groups.values():
         group.sort(key=lambda k: _terms(plays[k][0]))
@@ -83,29 +85,39 @@ def _in_step(plays: Sequence[Play]) -> Iterator[list[int]]:
             yield group[begin:begin + LANES]
 
 
+def _when(job: CompiledJob, schedule: Schedule) -> object:
+    """Equal where schedules differ in their goals at most, and in when these come: a servo's delay is its own. Lanes are switched
+    on and off together, so that a schedule which does that is only itself."""
+    if not schedule.on.all():
+        return id(schedule)
+    return schedule.dt, schedule.steps, schedule.log_every, schedule.begin, id(job.job.restarts)
+
+
 def _terms(job: CompiledJob) -> tuple[int, ...]:
     s = job.machine.servos
     return s.varies, len(s.speed), len(s.still_speed), len(s.lopsided), len(s.sag), bool(s.lag.any())
 
 
-def _played(chunk: Sequence[CompiledJob], schedule: Schedule, robots: _Robots) -> list[Array | None]:
+def _played(chunk: Sequence[CompiledJob], schedules: Sequence[Schedule], robots: _Robots) -> list[Array | None]:
     """Angles of each; None of one that has to be played alone."""
     fit = np.ones(len(chunk), dtype=bool)
     if not all(c.is_settled for c in chunk):
         states = states_in_lanes([_upright(c) for c in chunk])
-        _, fit = _run(chunk, settling(chunk[0].config, len(chunk[0].model.joints)), states, 0, robots)
+        _, fit = _run(chunk, [settling(chunk[0].config, len(chunk[0].model.joints))], states, 0, robots)
         for i, c in enumerate(chunk):
             if fit[i] and not c.is_settled:
                 c.settle(state_of_lane(states, i))
     states = states_in_lanes([c.begin() if c.is_settled else _upright(c) for c in chunk])
-    q, well = _run(chunk, schedule, states, chunk[0].rows, robots)
+    q, well = _run(chunk, schedules, states, chunk[0].rows, robots)
     return [q[i] if fit[i] and well[i] else None for i in range(len(chunk))]
 
 
-def _run(chunk: Sequence[CompiledJob], schedule: Schedule, states: State, rows: int, robots: _Robots) -> tuple[Array, Lost]:
-    """Angles (LANES, rows, n) from states on, and in which lanes they are good."""
+def _run(chunk: Sequence[CompiledJob], schedules: Sequence[Schedule], states: State, rows: int, robots: _Robots
+         ) -> tuple[Array, Lost]:
+    """Angles (LANES, rows, n) from states on, and in which lanes they are good. schedules: of each, or one for all."""
+    schedule, at, end = schedules_in_lanes(schedules)
     q, lost = np.empty((LANES, rows, len(robots.trees.parent))), np.zeros(LANES, dtype=bool)
-    announced(lambda: play_lanes(*robots[:3], schedule, states, q, lost, robots.room), play_lanes)
+    announced(lambda: play_lanes(*robots[:3], schedule, at, end, states, q, lost, robots.room), play_lanes)
     return q, ~lost[:len(chunk)]
 
 
