@@ -26,8 +26,7 @@ def as_stated(f: Fitted, region: Region, options: EvidenceOptions) -> tuple[Hypo
     h = f.hypothesis
     whole, moved = np.eye(len(h.theta)), mixing(h.numbers)
     for k, i in _found_zeros(h):
-        c = next(c for c, s in zip(h.effects, h.slices()) if s.start == i)
-        unit = (c.values([1.0])[0] - c.values([0.0])[0]) * c.parameters[0].si  # [rad]
+        unit = h.adds(i, k)
         whole[i, :len(moved)] = moved[k] / unit
         whole[k, i] = unit / h.numbers[k].sd
     return h.at(whole @ h.theta), whole @ f.covariance(region, options) @ whole.T
