@@ -17,6 +17,11 @@ static uint32_t finish(uint8_t *out, uint8_t id, uint8_t instruction, uint32_t p
     return parameters + DXL_OVERHEAD;
 }
 
+uint32_t dxl_blank(uint8_t *out, uint32_t count) {
+    for (uint32_t k = 0; k < count; k++) out[k] = 0;
+    return count;
+}
+
 uint32_t dxl_read(uint8_t *out, uint8_t id, uint8_t address, uint8_t count) {
     out[5] = address;
     out[6] = count;

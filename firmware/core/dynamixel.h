@@ -16,6 +16,7 @@ enum { DXL_MODEL = 0, DXL_ID = 3, DXL_CW_LIMIT = 6, DXL_CCW_LIMIT = 8, DXL_MAX_T
 enum dxl_answer { DXL_OK, DXL_SILENT, DXL_CUT, DXL_GARBLED, DXL_FOREIGN };
 
 /* Each writes a packet into `out` and returns its length. */
+uint32_t dxl_blank(uint8_t *out, uint32_t count); /* zeros, which begin no packet, but end one */
 uint32_t dxl_read(uint8_t *out, uint8_t id, uint8_t address, uint8_t count);
 uint32_t dxl_write(uint8_t *out, uint8_t id, uint8_t address, const uint8_t *values, uint32_t count);
 uint32_t dxl_sync_limits(uint8_t *out, const uint8_t *table, const uint16_t *limits);

@@ -25,6 +25,8 @@
 #define DEAD_ROUNDS 4u        /* rounds without an answer: about 100 ms, 300 ms are allowed; four by chance: 1e-12 at 0.1 % flips */
 #define DEAD_MS 200u          /* or for so long, where many servos fail and rounds take longer */
 #define FAILED_ROW 16u        /* reads that failed in a row, of whichever servos: 50 ms, before servos that restarted have started */
+#define FLUSH_ROW 8u          /* failed reads in a row before FLUSH_BYTES go out, and are followed by as many questions before FAILED_ROW */
+#define FLUSH_BYTES 128u      /* the most that one flipped bit adds to a length; servos take what follows for the rest of that packet */
 #define SUPPLY_ROUNDS 2u      /* rounds that more than half of the servos missed: not a servo has died, but the supply */
 #define ALARM_READINGS 3u     /* readings one after another that say the same before it is believed */
 #define HOT_CELSIUS 65u       /* the servo itself gives up at 70 */

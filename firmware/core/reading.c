@@ -9,7 +9,7 @@ void read_begin(struct robot *r) {
     r->failed_row = r->garbled_row = 0;
     r->low_rounds = r->dead_rounds = 0;
     r->sweep_started = r->now;
-    r->round_over = r->noise = false;
+    r->round_over = r->noise = r->send_blank = false;
     for (uint32_t j = 0; j < r->joints; j++) {
         struct servo *s = &r->servo[j];
         s->missed = s->garbled = s->hot = s->overloaded = 0;
@@ -17,8 +17,14 @@ void read_begin(struct robot *r) {
     }
 }
 
-/* Asks the servo whose turn it is; false in the pause between two rounds. */
+/* Asks the servo whose turn it is; false in the pause between two rounds, and where servos that may wait for the rest of a packet, its
+   length spoilt on the way, get that first. */
 bool read_next(struct robot *r) {
+    if (r->send_blank) {
+        r->send_blank = false;
+        bus_ask(&r->bus, dxl_blank(r->bus.tx, FLUSH_BYTES), 0, BUS_TIMEOUT_MS, r->now);
+        return false;
+    }
     if (r->round_over) {
         if (r->now - r->sweep_started < SWEEP_MS) return false;
         r->round_over = false;
@@ -162,6 +168,7 @@ static void check_answer(struct robot *r, bool right, uint8_t trouble) {
 static void bad(struct robot *r, uint32_t j, bool noise) {
     struct servo *s = &r->servo[j];
     r->failed_row++;
+    r->send_blank = r->failed_row == FLUSH_ROW;
     if (noise) { /* two of one ID garble an answer, and the end of theirs the next question: nobody answers that */
         r->garbled_row++;
         r->noise = true;

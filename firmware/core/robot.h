@@ -87,7 +87,7 @@ struct robot {
 
     uint32_t pose, cycle, next_pose; /* of the table that plays */
     bool stop_asked, ending; /* it is to end with its stop; that plays */
-    bool send_goals, send_release, send_limits, sending_read;
+    bool send_goals, send_release, send_limits, send_blank, sending_read;
     bool off_twice;    /* torque off goes out twice in a row: what spoils every other packet spoils one of them */
     bool gentle;       /* the first way to neutral: torque is limited */
     uint8_t came_from; /* the state before CHECK */

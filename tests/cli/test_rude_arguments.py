@@ -22,6 +22,7 @@ POSES = "time,flm,frm\n0,0,0\n0.5,10,10\n1,0,0\n"
     (("servos", "--port", "virtual", "--rate", "1e6"), "bit/s, got 1e6"),
     (("record", "localhost", "--port", "99999999"), "expected a port from 1 to 65535, got 99999999"),
     (("record", "localhost", "--port", "-1"), "expected a port from 1 to 65535, got -1"),
+    (("view", "puppy", "--port", "65536"), "expected a port from 1 to 65535, got 65536"),
     (("record", "localhost", "--name", "../up"), "expected a name that a file can have"),
     (("record", "localhost", "--name", ""), "expected a name that a file can have"),
     (("record", "localhost", "--name", "a,b"), "expected a name that a file can have"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.command import succeeds
+from tests.command import refused, succeeds
 from tests.servo_rig import SDF
 from workbench.compare.compare_session import compare_session
 from workbench.compare.prediction import predict_session
@@ -107,6 +107,19 @@ def test_a_log_at_rest_in_neutral_begins_at_rest(tmp_path: Path) -> None:
         write_joint_log(tmp_path / "log.csv", time, {"goal.j": np.zeros(50), "position.j": position})
         start = read_takes(load_session(_session(tmp_path)))[0][0].start_state()
         assert (start is None) if begins is None else (start is not None and np.rad2deg(start.q[0]) == pytest.approx(begins))
+
+
+def test_a_start_after_the_end_of_its_recording_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    time = 0.02 * np.arange(51)
+    write_joint_log(tmp_path / "log.csv", time, {"goal.j": np.sin(time), "position.j": np.sin(time)})
+    session = _session(tmp_path)
+    content = yaml.safe_load(session.read_text())
+    content["takes"][0]["starts_at"] = 0.95
+    session.write_text(yaml.safe_dump(content))
+    for verb in ("compare", "diagnose"):
+        said = refused(capsys, verb, str(session), "--out", str(tmp_path / "out"))
+        assert f"{session}: take 'log': starts_at: 0.95 s, but the recording ends at 1 s; expected 0.1 s or more of" in said
+    assert not (tmp_path / "out").exists()
 
 
 def test_velocity_comes_from_positions_where_a_log_tells_none(tmp_path: Path) -> None:

@@ -223,7 +223,7 @@ def test_kill_loses_at_most_a_second(tmp_path, capsys):
         process.communicate()
     assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "take.csv").exists()
-    line = refused(capsys, "record", "127.0.0.1", "--port", str(server.port), "--out", str(tmp_path))
+    line = refused(capsys, "record", "127.0.0.1", "--port", str(server.port), "--out", str(tmp_path / "other"))
     assert "no answer from Motive" in line
     succeeds(capsys, "record", "--finish", str(journal), "--out", str(tmp_path))
     report = json.loads((tmp_path / "take.capture.json").read_text())
@@ -276,6 +276,23 @@ def test_what_is_wrong_is_one_line(tmp_path, capsys):
     assert "through interface 127.0.0.1 (chosen by the route to it; this machine has" in line
     assert "--interface" in line
     assert sorted(p.name for p in tmp_path.iterdir()) == ["x"]
+
+
+def test_motive_is_asked_for_nothing_where_the_take_cannot_be_written(tmp_path, capsys):
+    (tmp_path / "x").write_text("a file")
+    with MotiveOnSockets(version=(4, 1)) as server:
+        line = refused(capsys, "record", "127.0.0.1", "--port", str(server.port), "--out", str(tmp_path / "x" / "out"))
+    assert "x/out/take.natnet: cannot be written" in line
+    assert server.client is None
+
+
+def test_a_recording_without_frames_leaves_nothing(tmp_path):
+    """Neither folders, nor a journal that is in the way of the next recording and that --finish refuses."""
+    with MotiveOnSockets(mute=True) as server, pytest.raises(InputError, match="no frame came"):
+        record_take(Recorder(UdpLink("127.0.0.1", command_port=server.port)), tmp_path / "a/b/take.csv", lambda: False)
+    with pytest.raises(InputError, match="stopped after 0 whole frames; expected 2 or more"):
+        record_take(Recorder(VirtualLink(VirtualMotive(NAMES, scene))), tmp_path / "a/b/take.csv", lambda: True)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_server_too_old_or_none_is_named():

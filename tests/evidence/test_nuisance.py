@@ -12,10 +12,10 @@ from workbench.effects.registers import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
-from workbench.identify.evidence.explanation import list_changes
 from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain, start
 from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
+from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.parameters import Candidate
 from workbench.robot import ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
@@ -73,7 +73,8 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     turned = recalibrate(model, {numbers["zero"]: -1.0})
     assert turned.effects[0].effect == "zero_offset"
     assert turned.effects[0].parameters["angle"] == pytest.approx(-np.degrees(numbers["zero"].sd))
-    (said, other) = list_changes(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
+    z = {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0}
+    (said, other) = list_changes(model, start(tuple(z)).at(np.array(list(z.values()))))
     assert (said.number, other.number) == ("back_emf", "coulomb_friction")
     assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
     assert (said.at_end, other.at_end) == (True, False)

@@ -7,10 +7,10 @@ import pytest
 
 from tests.servo_rig import rig_model
 from workbench.files import InputError
-from workbench.identify.evidence.explanation import list_changes
-from workbench.identify.evidence.hypothesis import Uncertain
+from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.nuisance import mixing, recalibrate, uncertain_numbers, uncertain_since, widen, with_known
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.recalibration import list_changes
 from workbench.robot import ServoConstants, load_model
 from workbench.robot.model_file import save_model
 from workbench.robot.servo_constants import servo_constants
@@ -61,7 +61,7 @@ def test_numbers_move_together_in_the_robot(tmp_path):
     assert moved.servo("j").torque_at_full_duty == pytest.approx(model.servo("j").torque_at_full_duty * math.exp(0.2))
     assert moved.servo("j").coulomb_friction == pytest.approx(model.servo("j").coulomb_friction * math.exp(0.2))
     assert moved.effects[0].parameters["angle"] == pytest.approx(math.degrees(-0.01))
-    said = {r.number: r for r in list_changes(model, {both: 1.0, friction: 1.0, zero: -1.0})}
+    said = {r.number: r for r in list_changes(model, start((both, friction, zero)).at(np.array([1.0, 1.0, -1.0])))}
     assert said["coulomb_friction"].sigmas * said["coulomb_friction"].sd == pytest.approx(
         moved.servo("j").coulomb_friction - model.servo("j").coulomb_friction)
     assert said["coulomb_friction"].sd == pytest.approx(math.hypot(0.1, 0.3) * model.servo("j").coulomb_friction)

@@ -234,6 +234,23 @@ def test_flips_in_both_directions_stop_nothing_and_every_goal_is_put_right() -> 
     flips(8)
 
 
+def test_a_length_that_is_spoilt_on_the_way_silences_no_servo_for_long() -> None:
+    """Servos take what follows for the rest of a packet, here of 128 bytes more: as many as 17 questions have, with no pose among
+    them, after which the supply would be thought dead."""
+    robot, heard = Robot(), bytearray(3)
+    robot.play()
+
+    def line(value: int) -> int:
+        spoilt = len(heard) < 4 and heard[-3:-1] == b"\xff\xff" and heard[-1] < 0xFE and value == 4
+        heard[:] = bytes(4) if spoilt or len(heard) == 4 else heard[1:] + bytes([value])
+        return value ^ 0x80 if spoilt else value
+
+    robot.bus.to_servos = line
+    robot.run(400)
+    assert not [m for m in robot.messages() if isinstance(m, StateMessage) and m.state == ControllerState.LIMP]
+    assert [len(data) for _, data in robot.ear.packets if not any(data)] == [128]
+
+
 @pytest.mark.slow
 def test_flips_for_ten_minutes() -> None:
     flips(600)

@@ -92,8 +92,10 @@ def test_every_verb_that_takes_packages_uses_them(command: list[str], tmp_path: 
 
 
 def test_view_says_where_to_look_and_ends(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["view", "fox", "--seconds", "0.1"]) == 0
-    assert capsys.readouterr().out.startswith("open http://localhost:")
+    assert main(["view", "fox", "--seconds", "0.1", "--take", "walk"]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("open http://localhost:")
+    assert "warning: --take has no effect on a model" in said.err
 
 
 def test_view_plays_a_motion_of_another_robot_than_the_puppy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

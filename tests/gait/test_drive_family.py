@@ -72,6 +72,17 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
         read_family(gait, model)
 
 
+def test_a_gait_that_is_not_there_or_was_edited_has_no_family(gait: Path) -> None:
+    """Its shape stands in the certificate, and would be driven whatever file is named."""
+    with pytest.raises(InputError, match=r"other\.csv: file not found"):
+        load_family(gait.with_name("other.csv"), puppy_model())
+    lines = gait.read_text().splitlines()
+    time, angle, *others = lines[-1].split(",")
+    gait.write_text("\n".join([*lines[:-1], ",".join([time, str(float(angle) + 3), *others])]) + "\n")
+    with pytest.raises(InputError, match=r"certificate\.json: it is another table's than gait\.csv"):
+        load_family(gait, puppy_model())
+
+
 def test_a_family_whose_tables_break_a_joints_limit_says_at_which_turn(gait: Path) -> None:
     family = load_family(gait, puppy_model())
     deep = GaitFamily(family.machine, replace(family.shape, crouch=0.07))

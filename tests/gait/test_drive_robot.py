@@ -168,6 +168,9 @@ def test_a_robot_that_cameras_do_not_see_is_refused() -> None:
     (["--image", "x.bin"], "--image needs --port"),
     (["--port", "/dev/null"], "--motive"),
     (["--port", "/dev/null", "--motive", "h", "--draw", "1"], "--robot and --draw"),
+    (["--robot", "fox"], "expected the links and joints of the robot of the gait (--model)"),
+    (["--avoid", "1.1,0,0.3"], "way-point 1 (1, 0) lies in the disc to walk around, 0.3 m about (1.1, 0)"),
+    (["--avoid", "3,3,0.1", "--avoid", "0,-0.1,0.2"], "the start (0, 0) lies in the disc to walk around, 0.2 m about (0, -0.1)"),
 ])
 def test_options_that_do_not_fit_are_one_line(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str],
                                               tmp_path: Path) -> None:

@@ -74,14 +74,15 @@ def run(args: argparse.Namespace) -> int:
     from workbench.gait.drive.family import load_family
     from workbench.gait.drive.options import DriveOptions
     from workbench.gait.drive.path import WayPath
-    from workbench.gait.drive.plan import Disc
+    from workbench.gait.drive.plan import Disc, check_discs
     from workbench.view.report.drive import write_drive
 
     model = load_model(args.model, args.packages)
     family = load_family(args.gait, model)
     if args.certify:
         return _certify(args, family)
-    path = WayPath(args.points)
+    path, discs = WayPath(args.points), [Disc(*d) for d in args.avoid]
+    check_discs(path, discs)
     _check_port(args, model)
     certified = _load_certificate(args, model)
     options = DriveOptions(law=args.law, blind=args.blind)
@@ -91,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
         step_map = certified.step_map if certified else _fit_map(args, family, progress)
-        controller = CycleController(path, step_map, family.period, options, [Disc(*d) for d in args.avoid])
+        controller = CycleController(path, step_map, family.period, options, discs)
         watch = _viewer(model, controller) if args.view else None
         code, straight = 0, None
         if args.port is None:
@@ -228,7 +229,9 @@ def _robot(args: argparse.Namespace, model: RobotModel, folder: Path) -> RobotMo
     from workbench.gait.ensemble import load_ensemble
 
     if args.robot:
-        return load_model(args.robot, args.packages)
+        robot = load_model(args.robot, args.packages)
+        robot.check_build(model, "the robot of the gait (--model)")
+        return robot
     return model if args.draw is None else load_ensemble().draws(model, 1, args.draw, folder)[0]
 
 

@@ -74,6 +74,16 @@ def positive(text: str) -> int:
     return value
 
 
+def port(text: str) -> int:
+    """The number of a network port, for argparse."""
+    from workbench.files.numerals import whole_of
+
+    value = whole_of(text)
+    if value is None or not 1 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"expected a port from 1 to 65535, got {text[:40]}")
+    return value
+
+
 def seed(text: str) -> int:
     """A whole number of at least 0, for argparse: random generators take no other."""
     from workbench.files.numerals import whole_of

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from workbench.cli.options import add_out, seconds
+from workbench.cli.options import add_out, port, seconds
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--name", type=_take_name, default="take", help="name of the take, here and in Motive (default: take)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="stop after S seconds (default: at Ctrl-C)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
-    parser.add_argument("--port", type=_port, default=1510, metavar="N", help="Motive's command port (default: 1510)")
+    parser.add_argument("--port", type=port, default=1510, metavar="N", help="Motive's command port (default: 1510)")
     parser.add_argument("--no-motive", action="store_true", help="do not also record the take on Motive's own disk")
     parser.add_argument("--bag", action="store_true", help="also write the take as a ROS 2 bag (MCAP), NAME_bag")
     parser.add_argument("--finish", metavar="JOURNAL", help="recover the take from NAME.natnet after an interrupted recording")
@@ -34,16 +34,6 @@ def _take_name(text: str) -> str:
     if text != Path(text).name or text in ("", ".", "..") or "," in text or not text.isprintable() or len(text.encode()) > 200:
         raise argparse.ArgumentTypeError(f"expected a name that a file can have, without a comma, got {text[:40]!r}")
     return text
-
-
-def _port(text: str) -> int:
-    """The number of a UDP port, for argparse."""
-    from workbench.files.numerals import whole_of
-
-    value = whole_of(text)
-    if value is None or not 1 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f"expected a port from 1 to 65535, got {text[:40]}")
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

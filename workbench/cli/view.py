@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from workbench.cli.options import PUPPY, add_cycles, add_model, load_model, positive, seconds
+from workbench.cli.options import PUPPY, add_cycles, add_model, load_model, port, seconds
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,7 +22,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--base", choices=("free", "fixed"),
                         help="base of a recording or motion (default: as in the model's takes, else free)")
     add_cycles(parser, 3)
-    parser.add_argument("--port", type=positive, metavar="N", help="server port (default: the first free one from 7000 on)")
+    parser.add_argument("--port", type=port, metavar="N", help="server port (default: the first free one from 7000 on)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="stop after S seconds")
     add_model(parser, "the bundled puppy")
     parser.set_defaults(run=run)
@@ -30,11 +30,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Shows the subject and waits."""
-    from workbench.cli.progress import Progress
+    from workbench.cli.progress import Progress, show_warnings, warn
     from workbench.view.scene.live import open_meshcat, pose_by_sliders, show, show_session, show_take
     from workbench.view.scene.subject import subject_of, take_of
 
     subject = subject_of(args.subject)
+    of_no_use = {"session": ("base", "cycles"), "model": ("take", "base", "cycles")}.get(subject, ("take",))
+    warn("view", [f"--{name} has no effect on a {subject}" for name in of_no_use if getattr(args, name) is not None])
     model = load_model(args.subject if subject == "model" else args.model, args.packages)
     with Progress("view") as progress:
         if subject == "session":
@@ -48,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             take = take_of(args.subject, model, args.base or model.usual_base, args.cycles, progress)
             meshcat = show_take(model, take, meshcat=open_meshcat(args.port))
+    show_warnings()
     print(f"open {meshcat.web_url()} (Ctrl-C ends)", flush=True)
     until = time.monotonic() + (args.seconds or float("inf"))
 

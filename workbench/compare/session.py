@@ -96,8 +96,7 @@ class Session:
 
     def with_model(self, model: RobotModel) -> Session:
         """The same recordings with another model of the robot; InputError if it is a different robot."""
-        if model.joints != self.model.joints or model.kinematics.links != self.model.kinematics.links:
-            raise InputError(model.description, f"expected the links and joints of the robot in {self.path}")
+        model.check_build(self.model, f"the robot in {self.path}")
         return replace(self, model=model)
 
 

@@ -86,7 +86,7 @@ class RegisteredTake(ReadTake):
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
     """All recordings of a session, and those left out with the reason. InputError if none remains. An asset without a link in the
-    session, or a mistyped name, is an error (InputError) rather than a damaged take."""
+    session, a start after a recording's end, or a mistyped name, is an error (InputError) rather than a damaged take."""
     read: list[ReadTake] = []
     left: list[tuple[str, str]] = []
     for spec in session.takes:
@@ -105,7 +105,11 @@ def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
             raise InputError(session.path, f"take '{spec.name}': motion: is missing, and the recording has no commands")
         if spec.starts_at is None and spec.motion is not None and (start := start_in_log(recording, commands)) is not None:
             spec = replace(spec, starts_at=start)
-        read.append(ReadTake(spec, model, recording, commands))
+        take = ReadTake(spec, model, recording, commands)
+        if spec.starts_at is not None and take.duration < FILES.least_seconds:
+            raise InputError(session.path, f"take '{spec.name}': starts_at: {spec.starts_at:g} s, but the recording ends at "
+                                           f"{recording.time[-1]:.6g} s; expected {FILES.least_seconds:g} s or more of motion")
+        read.append(take)
     return read, remaining(session, read, tuple(left))
 
 

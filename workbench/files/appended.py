@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,6 +20,7 @@ class AppendedFile:
     def __init__(self, path: Path, if_it_exists: str, sync_every: float = math.inf) -> None:
         self.path, self._sync_every, self._synced = path, sync_every, time.monotonic()
         try:
+            self._made = [folder for folder in path.parents if not folder.exists()]
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except FileExistsError:
@@ -42,6 +44,14 @@ class AppendedFile:
                 self._synced = time.monotonic()
         except OSError as e:
             raise InputError(self.path, f"cannot be written ({e.strerror}); what came before is kept") from None
+
+    def discard(self) -> None:
+        """Closes and deletes it, and the folders that were made for it, where nothing else is in them."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+        for folder in self._made:
+            with suppress(OSError):  # not empty
+                folder.rmdir()
 
     def close(self) -> None:
         """Flushes to disk and closes."""

@@ -167,11 +167,17 @@ def _field(name: str, value: Any) -> Any:
     return value
 
 
+def certificate_beside(motion: str | Path) -> Certificate:
+    """The certificate in the folder of a motion file, kept or not. InputError where one of the two is missing."""
+    if not Path(motion).is_file():
+        raise InputError(motion, "file not found")
+    return read_certificate(Path(motion).parent / NAME)
+
+
 def read_shape(motion: str | Path) -> GaitShape:
     """The shape in the certificate of a motion file, which lies in the same folder, kept or not. InputError where there is no
-    certificate, or no shape in it."""
-    at = Path(motion).parent / NAME
-    certificate = read_certificate(at)
+    such file, no certificate, or no shape in it."""
+    at, certificate = Path(motion).parent / NAME, certificate_beside(motion)
     try:
         return GaitShape.from_plain(certificate.shape)
     except (KeyError, TypeError, ValueError):
@@ -189,14 +195,19 @@ def check_certificate(path: str | Path, motion: Motion, model: RobotModel) -> Ce
     reports a broken limit."""
     certificate = read_certificate(Path(path).parent / NAME)
     at = Path(path).parent / NAME
-    if table_sha256(motion.as_table()) not in certificate.tables.values():
-        raise InputError(at, f"it is another table's than {Path(path).name}")
+    check_table(certificate, path, motion)
     if certificate.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
     if not certificate.kept:
         broken = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
         raise InputError(at, f"it reports a broken limit: {broken}")
     return certificate
+
+
+def check_table(certificate: Certificate, path: str | Path, motion: Motion) -> None:
+    """InputError where a certificate is of another table than that of the motion file in its folder."""
+    if table_sha256(motion.as_table()) not in certificate.tables.values():
+        raise InputError(Path(path).parent / NAME, f"it is another table's than {Path(path).name}")
 
 
 def hashes(**tables: PoseTable) -> dict[str, str]:

@@ -218,6 +218,11 @@ class RobotModel:
         return (f"<p>{escape(Path(self.description).name)}: base {escape(self.base)}, {k.mass:.3f} kg, "
                 f"{len(self.joints)} joints; effects: {effects}</p><table><tr>{heads}</tr>{rows}</table>")
 
+    def check_build(self, other: RobotModel, what: str) -> None:
+        """InputError unless the other robot, which `what` describes, has the same links and joints."""
+        if self.joints != other.joints or self.kinematics.links != other.kinematics.links:
+            raise InputError(self.description, f"expected the links and joints of {what}")
+
     def check_base(self, floating: bool) -> None:
         """InputError unless the base is a link of the model, and the root of its tree where it has to float."""
         k = self.kinematics

@@ -46,8 +46,8 @@ class Posterior:
             raise InputError(None, f"posterior: expected mean ({n},) and covariance ({n}, {n}), got {got}")
 
     def in_order(self, effects: Sequence[EffectSpec]) -> Posterior:
-        """The same, in the order of these effects, as a model.yaml with them has it. Numbers of one name (a zero that was
-        recalibrated, and one that was found) keep the order among them."""
+        """The same, in the order of these effects, as a model.yaml with them has it. Numbers of one name (a payload that the
+        nominal robot has, and one that was found) keep the order among them."""
         left = list(range(len(self.names)))
         at = []
         for name in parameter_names(effects):

@@ -25,6 +25,8 @@ from workbench.types import Array
 DRIFT_AFTER = 10.0
 """Seconds of echoes from which the clock's drift is estimated: 0.1 ms over them are 10 ppm, less than the difference of two
 crystals."""
+FEWEST = 2
+"""Frames of a take: fewer have no rate."""
 SAME = 50e-6
 """Drift over a whole take [s] below which the nominal rate is taken for the measured one."""
 
@@ -67,8 +69,8 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
         if frame is not None:
             frames[frame.number] = frame
             soonest = min(soonest, arrival - frame.time)
-    if len(frames) < 2 or not stream.about:
-        raise InputError(journal, f"{len(frames)} whole frames; expected two or more")
+    if len(frames) < FEWEST or not stream.about:
+        raise InputError(journal, f"{len(frames)} whole frames; expected {FEWEST} or more")
     counts = stream.counts()
     numbers = np.array(sorted(frames))
     times = np.array([frames[n].time for n in numbers.tolist()])
@@ -78,8 +80,8 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
     first_host = first - clock.offset if math.isfinite(clock.offset) else first + soonest
     if until is not None:
         frames = {n: f for n, f in frames.items() if first_host + (f.time - first) <= until}
-        if len(frames) < 2:
-            raise InputError(journal, "fewer than two frames before the recording's end")
+        if len(frames) < FEWEST:
+            raise InputError(journal, f"{len(frames)} whole frames before the recording's end; expected {FEWEST} or more")
     bodies = _tracks(frames, stream.names, counts.first, max(frames))
     gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
     note = stream.about

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from workbench.device.capture.finish import Capture, finish
+from workbench.device.capture.finish import FEWEST, Capture, finish
 from workbench.device.capture.journal import Journal
 from workbench.device.capture.recorder import Recorder
 from workbench.files import InputError
@@ -21,21 +21,16 @@ def record_take(recorder: Recorder, take: Path, until: Callable[[], bool], secon
                 until_time: Callable[[], float | None] = lambda: None) -> Capture:
     """Records until `until()` or so many seconds [s], and has Motive record it too (`motive_too`): its own file lacks no frame
     that the network lost. until_time(): asked at the end, the time on this machine's monotonic clock [s]
-    after which frames are left out. The journal goes when the take is on the disk. InputError where no server, no frame or no
-    disk is there."""
+    after which frames are left out. The journal is there before the server is asked for anything, and goes when the take is on
+    the disk, or no take can be made of it. InputError where no disk, no server or no frame is there."""
     try:
-        recorder.connect()
         with Journal(take.with_suffix(".natnet")) as journal:
-            refusal = recorder.request_recording(take.stem) if motive_too else ""
             try:
-                recorder.listen(journal, until, progress, seconds)
+                refusal = _record(recorder, journal, take.stem, until, seconds, motive_too, progress)
             except BaseException:
-                if not recorder.counts_received:
-                    journal.path.unlink(missing_ok=True)
+                if recorder.counts.received < FEWEST:
+                    journal.discard()
                 raise
-            finally:
-                if motive_too and not refusal:
-                    recorder.stop_recording()
     finally:
         recorder.link.close()
     motive_state = None if not motive_too else refusal or f"recorded as '{take.stem}'"
@@ -43,6 +38,21 @@ def record_take(recorder: Recorder, take: Path, until: Callable[[], bool], secon
     capture = finish(journal.path, take, ended, motive_state, until_time())
     journal.path.unlink()
     return capture
+
+
+def _record(recorder: Recorder, journal: Journal, name: str, until: Callable[[], bool], seconds: float | None, motive_too: bool,
+            progress: Progress | None) -> str:
+    """Fills the journal; why Motive did not record the take as well, "" where it did or was not asked to."""
+    recorder.connect()
+    refusal = recorder.request_recording(name) if motive_too else ""
+    try:
+        received = recorder.listen(journal, until, progress, seconds).received
+    finally:
+        if motive_too and not refusal:
+            recorder.stop_recording()
+    if received < FEWEST:
+        raise InputError(None, f"{recorder.link.description}: stopped after {received} whole frames; expected {FEWEST} or more")
+    return refusal
 
 
 class BackgroundRecording:

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-from workbench.gait.certificate import NAME, read_certificate
+from workbench.gait.certificate import NAME, certificate_beside, check_table
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import GaitTable, gait_table, join_tables
-from workbench.motion import Commands, PoseTable
+from workbench.motion import Commands, PoseTable, load_motion
 from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
@@ -123,11 +123,11 @@ def _calmest(cycle: PoseTable) -> int:
 
 def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
     """The family of a gait that `optimize` wrote: its shape is read from the certificate in the folder of `motion`. InputError
-    where there is none, or it is of another robot."""
-    at = Path(motion).parent / NAME
-    certificate = read_certificate(at)
+    where there is none, or it is of another robot or another table."""
+    at, certificate = Path(motion).parent / NAME, certificate_beside(motion)
     if certificate.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
+    check_table(certificate, motion, load_motion(motion, model))
     try:
         shape = GaitShape.from_plain(certificate.shape)
     except (KeyError, TypeError, ValueError):

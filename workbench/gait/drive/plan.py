@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
+from workbench.files import InputError
 from workbench.gait.drive.family import Steer
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
@@ -22,6 +23,16 @@ class Disc:
     x: float
     y: float
     radius: float
+
+
+def check_discs(path: WayPath, discs: Sequence[Disc]) -> None:
+    """InputError where the start of a path, or a way-point, lies in a disc that it has to keep clear of."""
+    for n, (x, y) in enumerate([(0.0, 0.0), *path.points.tolist()]):
+        for disc in discs:
+            if np.hypot(x - disc.x, y - disc.y) <= disc.radius:
+                what = f"way-point {n} ({x:g}, {y:g})" if n else "the start (0, 0)"
+                raise InputError(None, f"{what} lies in the disc to walk around, "
+                                       f"{disc.radius:g} m about ({disc.x:g}, {disc.y:g})")
 
 
 @dataclass(frozen=True, eq=False)

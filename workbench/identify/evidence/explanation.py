@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,19 +12,11 @@ import numpy as np
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
-from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain
+from workbench.identify.evidence.hypothesis import ZERO
 from workbench.identify.evidence.leftover import list_leftover
 from workbench.identify.evidence.motion_range import join_ranges, range_of, tell_faster
-from workbench.identify.evidence.nuisance import (
-    UNITS,
-    as_mapping,
-    changed_by,
-    mixing,
-    nominal_value,
-    turned_horn,
-    widen,
-    with_known,
-)
+from workbench.identify.evidence.nuisance import mixing, turned_horn, widen, with_known, with_whole_zeros
+from workbench.identify.evidence.recalibration import as_stated, list_changes
 from workbench.identify.evidence.rollouts import Rollouts, extrapolate
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.evidence.tied_names import gravity_over_torque, shared_by_tie
@@ -41,8 +33,10 @@ from workbench.robot.model_file import parameter_names
 from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
+    from workbench.identify.evidence.hypothesis import Hypothesis
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
+    from workbench.identify.evidence.region import Region
     from workbench.identify.evidence.robot_search import RobotFound
     from workbench.identify.evidence.search import Found
     from workbench.identify.evidence.tied_names import TieFits
@@ -78,15 +72,19 @@ class Explanation(SearchResult):
     @property
     def model(self) -> RobotModel:
         """The robot with its numbers recalibrated and its effects."""
-        return self.rollouts.model([p.best.hypothesis for p in self.posteriors])
+        return with_whole_zeros(self.rollouts.model([p.best.hypothesis for p in self.posteriors]))
+
+    def _stated(self) -> list[tuple[Region, RegionPosterior, Hypothesis, Array]]:
+        """Each region's posterior, with the likeliest hypothesis and the covariance of its theta `as_stated`."""
+        each = zip(self.rollouts.regions, self.posteriors)
+        return [(region, p, *as_stated(p.best, region, self.options)) for region, p in each]
 
     @property
     def calibrated(self) -> RobotModel:
         """The same, with how well its servos' numbers are known now."""
         model = self.model
-        for region, p in zip(self.rollouts.regions, self.posteriors):
-            numbers = p.best.hypothesis.numbers
-            n, covariance = len(numbers), p.best.covariance(region, self.options)
+        for region, _, h, covariance in self._stated():
+            numbers, n = h.numbers, len(h.numbers)
             observed = {joint: join_ranges(self._known_range(joint), self._range_now(joint)) for joint in region.joints}
             model = with_known(model, numbers, widen(covariance[:n, :n], self.options.formal), observed)
         return model
@@ -102,14 +100,12 @@ class Explanation(SearchResult):
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
-        return tuple(r for p in self.posteriors
-                     for r in list_changes(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
+        return tuple(r for p in self.posteriors for r in list_changes(self.nominal, p.best.hypothesis))
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The likeliest model's effects, the surest first."""
         out, ties = self._of_robot(evidence, before, after), {t.where: t for t in self.tied}
-        for region, p in zip(self.rollouts.regions, self.posteriors):
-            h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+        for region, p, h, covariance in self._stated():
             joint = region.joints[0]
             beyond = tell_faster(joint, self._known_range(joint), self._range_now(joint), self.options.faster)
             for (c, x), s in zip(h.sizes(), h.slices()):
@@ -177,8 +173,7 @@ class Explanation(SearchResult):
         model = self.model
         names = parameter_names(model.effects)
         blocks: dict[tuple[str, tuple[str, ...]], Array] = {}
-        for region, p in zip(self.rollouts.regions, self.posteriors):
-            h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+        for _, _, h, covariance in self._stated():
             moved = mixing(h.numbers)
             for k, number in enumerate(h.numbers):
                 if number.name == ZERO:
@@ -247,16 +242,3 @@ class Explanation(SearchResult):
                     hypotheses[k] = other.hypothesis
                     out.append(Tie(self.model, self.rollouts.model(hypotheses), rival[1]))
         return tuple(out)
-
-
-def list_changes(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
-    """Nominal and recalibrated values, for the report, those that went furthest first."""
-    sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
-    ended = {(n.joint, n.name) for n, by in z.items() if math.isclose(abs(by), FAR, rel_tol=1e-3)}
-    out = []
-    for (joint, name), by in changed_by(z).items():
-        nominal = 0.0 if name == ZERO else nominal_value(model.servo(joint), name)
-        value = by if name == ZERO else nominal * math.exp(by)
-        out.append(Recalibrated(name, (joint,), nominal, value, sds[joint, name] * (nominal or 1.0), UNITS[name],
-                                (joint, name) in ended))
-    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

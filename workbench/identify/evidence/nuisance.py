@@ -98,6 +98,23 @@ def turned_horn(joint: str, angle: float) -> EffectSpec:
     return EffectSpec(effect.name, (joint,), {p.name: angle / p.si})
 
 
+def with_whole_zeros(model: RobotModel) -> RobotModel:
+    """The robot with one effect for each zero, where several (nominal, recalibrated, found) turn the same horn and their sum is
+    within the effect's range."""
+    zero = zero_effect()
+    (p,) = zero.parameters
+    out: list[EffectSpec] = []
+    for e in model.effects:
+        k = next((k for k, o in enumerate(out) if e.effect == zero.name and (o.effect, o.where) == (e.effect, e.where)), None)
+        both = [] if k is None else [o.parameters[p.name] for o in (out[k], e)]
+        whole = sum(angle for angle in both if not isinstance(angle, tuple))
+        if k is not None and p.low <= whole <= p.high:
+            out[k] = replace(e, parameters={p.name: whole})
+        else:
+            out.append(e)
+    return model if len(out) == len(model.effects) else model.with_effects(out)
+
+
 def nominal_value(servo: ServoConstants, name: str) -> float:
     """The nominal value of one of UNITS, ZERO apart."""
     return float(getattr(servo, name))

@@ -16,6 +16,7 @@ from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior
+from workbench.identify.evidence.recalibration import as_stated
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque, competes
 from workbench.identify.fitting.lockstep import side_by_side
@@ -156,9 +157,9 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
     names = []
     for g in fits.names:
         shown = p.best if _is_same_model(p.best.hypothesis, g.hypothesis) else g  # a name that was found: its finding's size
-        c, x = shown.hypothesis.sizes()[-1]
-        own, tie = shown.hypothesis.slices()[-1], as_torque(region, options, shown, c)
-        formal = shown.covariance(region, options)[own, own]
+        h, whole = as_stated(shown, region, options)
+        (c, x), own = h.sizes()[-1], h.slices()[-1]
+        formal, tie = whole[own, own], as_torque(region, options, shown, c)
         covariance = formal if tie is None else tie.covariance(formal, x)
         names.append(TiedName(c.name, c.where, estimates(c, x, covariance), c.effect.sentence(c.spec(x)),
                               fits.behind(g)))

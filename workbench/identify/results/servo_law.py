@@ -7,10 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from workbench.identify.results.findings import Change, Estimate
 from workbench.robot.torque_table import UNITS, TorqueTable
+
+if TYPE_CHECKING:
+    from workbench.identify.results.findings import Change, Estimate
 
 
 @dataclass(frozen=True)
