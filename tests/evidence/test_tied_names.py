@@ -47,7 +47,7 @@ def found(log_ratio, sd, options=OPTIONS, loaded=1.0):
     fits = lockstep(rig, {0: fits_of_tie(here, options, fit)})[0]
     if fits is not None:
         again = [lockstep(rig, {0: regress(here, options, g)})[0] for g in (fits.torque, *fits.names)]
-        fits = TieFits(again[0], tuple(again[1:]))
+        fits = TieFits(here, again[0], tuple(again[1:]))
     return here, fit, fits
 
 
@@ -80,6 +80,18 @@ def test_another_option_of_an_effect_that_stays_is_no_name_of_the_tie():
     fit = lockstep(rig, {0: fit_hypothesis(here, OPTIONS, h, 0.1, 2 * OPTIONS.iterations)})[0]
     fits = lockstep(rig, {0: fits_of_tie(here, OPTIONS, fit)})[0]
     assert {g.hypothesis.effects[-1].name for g in fits.names} == {"ground_tilt"}
+
+
+def test_the_last_fit_may_be_to_more_of_the_takes_than_the_fits_of_the_tie():
+    """Of sessions over 100 s the search takes the beginnings, and the last fit 200 s."""
+    here, fit, fits = found(math.log(0.6), 0.5)
+    longer = replace(region([], n=800), numbers=here.numbers, candidates=here.candidates)
+    twice = replace(fit, r=np.tile(fit.r, 2), J=np.tile(fit.J, (2, 1)))
+    short = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
+    tied = gravity_over_torque(longer, OPTIONS, posterior_of([twice], OPTIONS), fits)
+    assert tied.names == short.names
+    assert tied.ratio.value == short.ratio.value
+    assert tied.ratio.high - tied.ratio.low < short.ratio.high - short.ratio.low
 
 
 def test_variation_between_days_is_not_reported():

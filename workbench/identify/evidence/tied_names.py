@@ -66,9 +66,10 @@ def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | Non
 
 @dataclass(frozen=True)
 class TieFits:
-    """Fits that each explain a ratio of gravity to torque by one cause. torque: by the servo's torques alone; names: by one
-    effect and nominal torques, the likeliest first."""
+    """Fits that each explain a ratio of gravity to torque by one cause, to this region. torque: by the servo's torques alone;
+    names: by one effect and nominal torques, the likeliest first."""
 
+    region: Region
     torque: Fitted
     names: tuple[Fitted, ...]
 
@@ -97,7 +98,7 @@ def fits_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Tie
     without = Hypothesis(published.numbers, tuple(c for c, _ in rest), sizes)
     fits = yield from _each_alone(published, options, without, f)
     within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
-    return TieFits(torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
+    return TieFits(region, torque, tuple(sorted(within, key=lambda g: -g.log_evidence)))
 
 
 def _each_alone(published: Region, options: EvidenceOptions, without: Hypothesis, f: Fitted) -> Asks[list[Fitted]]:
@@ -147,7 +148,8 @@ def _is_same_model(a: Hypothesis, b: Hypothesis) -> bool:
 def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None,
                         weighed: bool = False) -> GravityOverTorque | None:
     """The tie as it is reported; None where nothing of it has changed, or where an effect that could look like one of its effects
-    (`Effect.resembles`) is told from all of them. fits: of `fits_of_tie`; weighed: as the result has it."""
+    (`Effect.resembles`) is told from all of them. region: of the posterior, whose last fit may be to more of the takes than
+    `fits`, which are of `fits_of_tie`; weighed: as the result has it."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or fits is None or not fits.names:
         return None
@@ -156,10 +158,11 @@ def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPoste
         return None
     names = []
     for g in fits.names:
-        shown = p.best if _is_same_model(p.best.hypothesis, g.hypothesis) else g  # a name that was found: its finding's size
-        h, whole = as_stated(shown, region, options)
+        is_found = _is_same_model(p.best.hypothesis, g.hypothesis)  # then its finding's size
+        shown, to = (p.best, region) if is_found else (g, fits.region)
+        h, whole = as_stated(shown, to, options)
         (c, x), own = h.sizes()[-1], h.slices()[-1]
-        formal, tie = whole[own, own], as_torque(region, options, shown, c)
+        formal, tie = whole[own, own], as_torque(to, options, shown, c)
         covariance = formal if tie is None else tie.covariance(formal, x)
         names.append(TiedName(c.name, c.where, estimates(c, x, covariance), c.effect.sentence(c.spec(x)),
                               fits.behind(g)))
