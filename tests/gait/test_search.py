@@ -289,6 +289,9 @@ def test_options_that_cannot_be_met_end_in_one_line(capsys, tmp_path):
     assert "wider is straight ahead" in refused(capsys, "optimize", "--turn", "1e-6", "--speed", "0.1", *out)
     assert "neither of them max" in refused(capsys, "optimize", "--turn", "max", "--speed", "0.1", *out)
     assert "expected sideways, turn or arc" in refused(capsys, "optimize", "--right", *out)
-    assert "the certificate is missing" in refused(capsys, "optimize", "--start", str(tmp_path / "gait.csv"), *out)
+    start = tmp_path / "gait.csv"
+    assert "file not found" in refused(capsys, "optimize", "--start", str(start), *out)
+    start.touch()
+    assert "the certificate is missing" in refused(capsys, "optimize", "--start", str(start), *out)
     assert "expected a method that searches" in refused(capsys, "optimize", "--start", "x.csv", "--method", "plan", *out)
     assert not (tmp_path / "out" / "gait.csv").exists()
