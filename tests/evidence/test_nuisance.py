@@ -13,7 +13,7 @@ from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
 from workbench.identify.evidence.hypothesis import FAR, ZERO, Uncertain, start
-from workbench.identify.evidence.nuisance import recalibrate, uncertain_numbers
+from workbench.identify.evidence.nuisance import as_mapping, recalibrate, uncertain_numbers, with_known
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.recalibration import list_changes
 from workbench.identify.parameters import Candidate
@@ -176,3 +176,20 @@ def test_every_number_of_the_law_that_an_effect_changes_too_is_paired_with_it():
     for name, first in (("coulomb_friction", 0), ("zero_offset", 1)):
         assert at.with_effect(candidate(name), np.array([1.0])).alike() == [[first, 2]], name
     assert at.with_effect(candidate("backlash"), np.array([1.0])).alike() == []
+
+
+def test_a_delay_is_recalibrated_by_sums(tmp_path):
+    """Of 20 ± 10 ms nothing may be there; 60 ms are four standard deviations away. How well it is known stays the same in ms."""
+    model = rig_model(tmp_path, ServoConstants(goal_delay=0.02, sd=(("goal_delay", 0.01),)))
+    numbers = uncertain_numbers(model, "j")
+    (k,) = (k for k, n in enumerate(numbers) if n.name == "goal_delay")
+    for z, delay in ((-3.0, 0.0), (-2.0, 0.0), (-1.0, 0.01), (3.0, 0.05)):
+        h = start(numbers).at(np.where(np.arange(len(numbers)) == k, z, 0.0))
+        changed = recalibrate(model, as_mapping(numbers, h.z))
+        assert changed.servo("j").goal_delay == pytest.approx(delay, abs=1e-12)
+        assert h.constant(k, z) == pytest.approx(delay, abs=1e-12)
+        said = next(c for c in list_changes(model, h) if c.number == "goal_delay")
+        assert said.value == pytest.approx(delay, abs=1e-12)
+        if delay:
+            known = with_known(changed, numbers, 0.04 * np.eye(len(numbers)))
+            assert dict(known.servo("j").sd)["goal_delay"] == pytest.approx(0.002)

@@ -30,6 +30,8 @@ ZERO = "zero"
 """Name of a joint's zero among the numbers that are recalibrated."""
 SUM_OF = {"dead_zone": "margin", "minimum_duty": "punch_duty"}
 """Numbers that are summands of the constant to which effects add."""
+SUMS = ("goal_delay",)
+"""Numbers that are sums of parts (rounds of a bus, of an adapter, of a servo's loop), of which each may be absent."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -44,8 +46,9 @@ def zero_effect() -> Effect:
 @dataclass(frozen=True)
 class Uncertain:
     """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
-    deviations make it nominal · exp(sd z), and a zero of sd z. others: the constants that change with it, and their change for
-    each standard deviation, where an earlier diagnosis knew only a combination; all z are still independent in the prior.
+    deviations make it nominal · exp(sd z), one of SUMS nominal · (1 + sd z), and a zero of sd z. others: the constants that
+    change with it, and their change for each standard deviation, where an earlier diagnosis knew only a combination; all z are
+    still independent in the prior.
     nominal [SI]: the nominal value, where an effect adds to the constant."""
 
     joint: str
@@ -56,7 +59,7 @@ class Uncertain:
 
     @property
     def changes(self) -> dict[str, float]:
-        """How far one standard deviation moves each number: the logarithm of it, [rad] of ZERO."""
+        """How far one standard deviation moves each number: the logarithm of it, a share of SUMS, [rad] of ZERO."""
         return {self.name: self.sd, **dict(self.others)}
 
     def is_changed_by(self, effect: Effect) -> bool:
@@ -67,6 +70,11 @@ class Uncertain:
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
+
+
+def scaled(name: str, by: Array | float) -> Array | float:
+    """A recalibrated constant over its nominal value. by: its changes added up, of `Uncertain.changes`."""
+    return np.maximum(1.0 + np.asarray(by), 0.0) if name in SUMS else np.exp(by)
 
 
 def term_of(c: Candidate) -> Term:
@@ -162,7 +170,7 @@ class Hypothesis:
             return np.asarray(n.sd * np.asarray(z))
         by_others = sum(x * other.changes.get(n.name, 0.0) for j, (other, x) in enumerate(zip(self.numbers, self.z))
                         if j != k and other.joint == n.joint)
-        return np.asarray(n.nominal * np.exp(by_others + n.sd * np.asarray(z)))
+        return np.asarray(n.nominal * scaled(n.name, by_others + n.sd * np.asarray(z)))
 
     def adds(self, i: int, to: int) -> float:
         """What a unit of the effect's size that is number i of theta adds to the constant of number `to` [SI]; NaN where it
@@ -223,8 +231,8 @@ def split_sums(h: Hypothesis, J: Array, options: EvidenceOptions) -> tuple[Hypot
     a constant recalibrated to its limit would leave the effect too little to be told from nothing."""
     for k, i in h.alike():
         unit, here = h.adds(i, k), h.theta[k]
-        total, factor = h.constant(k, here) + unit * h.theta[i], h.numbers[k].name != ZERO
-        if not np.isfinite(total) or (factor and total <= 0):
+        total, factor = h.constant(k, here) + unit * h.theta[i], h.numbers[k].name not in (ZERO, *SUMS)
+        if not np.isfinite(total) or (h.numbers[k].name != ZERO and total <= 0):
             continue  # the effect takes away all that there is: more of it changes nothing
         each = np.linspace(-FAR, FAR, NUMERICS.splits)
         theta = np.tile(h.theta, (len(each) + 1, 1))

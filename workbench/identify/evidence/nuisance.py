@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from workbench.identify.evidence.hypothesis import ZERO, Uncertain, zero_effect
+from workbench.identify.evidence.hypothesis import SUMS, ZERO, Uncertain, scaled, zero_effect
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.physical import SERVO
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
@@ -67,13 +67,13 @@ def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
         if name == ZERO:
             zeros += [turned_horn(joint, by)] if by else []
         elif by:
-            scales.setdefault(joint, {})[name] = math.exp(by)
+            scales.setdefault(joint, {})[name] = float(scaled(name, by))
     servos |= {joint: _scaled(servos[joint], tuple(by.items())) for joint, by in scales.items()}
     return model.with_physics(servos, (*model.effects, *zeros))
 
 
 def changed_by(z: Mapping[Uncertain, float]) -> dict[tuple[str, str], float]:
-    """How far z standard deviations move each number, by joint and name: as a logarithm, ZERO in [rad]."""
+    """How far z standard deviations move each number, by joint and name: as `Uncertain.changes`."""
     out: dict[tuple[str, str], float] = {}
     for number, by in z.items():
         for name, each in number.changes.items():
@@ -144,6 +144,9 @@ def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Arra
     motion that shows them, by joint."""
     servos = {j: model.servo(j) for j in model.joints}
     M = mixing(numbers)
+    for k, n in enumerate(numbers):  # shares of what a sum is now
+        if n.name in SUMS and (now := nominal_value(servos[n.joint], n.name)) > 0:
+            M[k] *= n.nominal / now
     C = M @ covariance @ M.T
     for joint in dict.fromkeys(n.joint for n in numbers):
         own = [k for k, n in enumerate(numbers) if n.joint == joint]
