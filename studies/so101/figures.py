@@ -68,7 +68,7 @@ def draw_overlay(p: Programme, paths: Mapping[str, Array], unit: Array, span: tu
         axes.set_title(f"{joint} [deg]")
     for axes in panels[-2:]:
         axes.set_xlabel("time [s]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=6)
     return figure
 
 
@@ -83,5 +83,5 @@ def draw_errors(by_model: Mapping[str, Array]) -> Figure:
                  label=name)
     axes.set_xticks(np.arange(len(JOINTS)), JOINTS)
     axes.set_ylabel("RMS error on validation [deg]")
-    style.legend_above(axes)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
