@@ -48,8 +48,7 @@ class Uncertain:
     """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
     deviations make it nominal · exp(sd z), one of SUMS nominal · (1 + sd z), and a zero of sd z. others: the constants that
     change with it, and their change for each standard deviation, where an earlier diagnosis knew only a combination; all z are
-    still independent in the prior.
-    nominal [SI]: the nominal value, where an effect adds to the constant."""
+    still independent in the prior. nominal: the nominal value, in the unit in which an effect adds to it [SI]."""
 
     joint: str
     name: str
