@@ -1,4 +1,4 @@
-"""How fast a joint moved when its servo was diagnosed: beyond that, nobody knows whether what is found is a change."""
+"""How fast a joint moved when its servo was diagnosed: beyond that, a finding need not be a change."""
 
 from types import SimpleNamespace
 

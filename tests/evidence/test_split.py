@@ -64,8 +64,8 @@ def test_what_is_taken_away_altogether_is_left_as_it_is(tmp_path):
 
 
 def test_friction_stays_where_the_fit_recalibrated_the_nominal_one_almost_as_far_as_it_may_go():
-    """Beside a nominal friction at 2.9 standard deviations the effect is small, and would be taken for nothing; without it, 3.1
-    would be needed, which is beyond what a recalibration may do."""
+    """With the nominal friction at 2.9 standard deviations the effect is so small that it seems to be absent; but without it the
+    recalibration would need 3.1, more than its limit."""
     c = candidate("coulomb_friction")
     of = region([c, *(candidate(n) for n in NAMES[1:])])
     (number,) = of.numbers

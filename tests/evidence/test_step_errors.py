@@ -1,4 +1,4 @@
-"""What a rollout's step is wrong by is taken off, as far as a robot near it tells it."""
+"""The error of a rollout's time step is subtracted, as estimated for a similar robot."""
 
 import numpy as np
 import pytest

@@ -235,8 +235,8 @@ def test_flips_in_both_directions_stop_nothing_and_every_goal_is_put_right() -> 
 
 
 def test_a_length_that_is_spoilt_on_the_way_silences_no_servo_for_long() -> None:
-    """Servos take what follows for the rest of a packet, here of 128 bytes more: as many as 17 questions have, with no pose among
-    them, after which the supply would be thought dead."""
+    """Servos read the next 128 bytes as the rest of a packet: as many as 17 questions have, with no pose among them, after which
+    the controller would conclude that the supply is dead."""
     robot, heard = Robot(), bytearray(3)
     robot.play()
 

@@ -73,7 +73,7 @@ def test_the_certificate_states_gain_and_falls_and_is_bound_to_gait_and_robot(ga
 
 
 def test_a_gait_that_is_not_there_or_was_edited_has_no_family(gait: Path) -> None:
-    """Its shape stands in the certificate, and would be driven whatever file is named."""
+    """The certificate has its shape, which would be driven whatever file is named."""
     with pytest.raises(InputError, match=r"other\.csv: file not found"):
         load_family(gait.with_name("other.csv"), puppy_model())
     lines = gait.read_text().splitlines()

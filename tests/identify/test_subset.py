@@ -183,7 +183,7 @@ def test_the_last_fit_uses_all_of_short_sessions_and_the_beginnings_of_long_ones
 
 
 def test_commands_of_a_log_are_put_in_the_models_order_once(tmp_path, monkeypatch):
-    """What is derived from commands is kept by the object."""
+    """Results derived from commands are cached by object."""
     model, told = arm(tmp_path), goals(1.0)
     takes, _ = read_takes(log_session(tmp_path, measured(told, played(model, told, ()), seed=1)))
     (e,) = prepare(load_session(tmp_path / "session.yaml"), takes, CONFIG, 1, lambda what, done: None).evidence

@@ -170,7 +170,7 @@ class Hearing:
     def heard(self, commands: Commands, until: float = math.inf) -> Commands:
         """The commands on which the servos act: those that were sent, with goals delayed according to the nominal law, and
         changed by effects. Torque off is not delayed: the duty register of an STS3215 is zero in the row that switches it off.
-        until [s]: what comes later matters to nobody, and is left out where no effect may bring it forward."""
+        until [s]: later commands are not needed, and are omitted where no effect may bring them forward."""
         until = math.inf if self.changes else until
         joints = self.model.joints
         late = self.late if commands.joints == joints else self.late[[joints.index(j) for j in commands.joints]]

@@ -69,7 +69,8 @@ def delay_commands(commands: Commands, columns: Iterable[int], late: float, swit
 
 
 class _Sent(NamedTuple):
-    """What a joint is sent: times (k,) [s]: when that changes; values (2, k + 1): goals and speeds, first those before."""
+    """Goals and speeds sent to one joint. times (k,) [s]: of their changes; values (2, k + 1): goals and speeds, first
+    those before the first change."""
 
     times: Array
     values: Array
@@ -78,7 +79,7 @@ class _Sent(NamedTuple):
 def delay_each(commands: Commands, late: Array, until: float = math.inf) -> Commands:
     """The commands with the goals and speeds of each joint `late` (n,) seconds later, none negative, as `delay_commands` has
     those of one delay after the other; servos are switched on and off as before. In one pass, since a search delays each of
-    a robot's joints by another time in every rollout. until [s]: of what is sent later nothing is needed."""
+    a robot's joints by another time in every rollout. until [s]: later commands are not needed."""
     commands, sent = _sent_to_each.get((id(commands), until), lambda: _changes(commands.until(until)), commands)
     heard = [each.times + wait for each, wait in zip(sent, late.tolist())]
     times = np.concatenate([commands.times, *heard])

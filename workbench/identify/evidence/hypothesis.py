@@ -28,9 +28,9 @@ UNNAMED = "unknown torque"
 """Represents a torque law among the terms of a hypothesis."""
 ZERO = "zero"
 """Name of a joint's zero among the numbers that are recalibrated."""
-SUM_OF = {"dead_zone": "margin", "minimum_duty": "punch_duty"}
-"""Numbers that are summands of the constant to which effects add."""
-SUMS = ("goal_delay",)
+PART_OF = {"dead_zone": "margin", "minimum_duty": "punch_duty"}
+"""Numbers that are one part of a constant to which effects add, and that constant."""
+ADDITIVE = ("goal_delay",)
 """Numbers that are sums of parts (rounds of a bus, of an adapter, of a servo's loop), of which each may be absent."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
@@ -46,7 +46,7 @@ def zero_effect() -> Effect:
 @dataclass(frozen=True)
 class Uncertain:
     """One constant of one joint's servo that is known to `sd`: a share of its nominal value, or [rad] for ZERO. z standard
-    deviations make it nominal · exp(sd z), one of SUMS nominal · (1 + sd z), and a zero of sd z. others: the constants that
+    deviations make it nominal · exp(sd z), one of ADDITIVE nominal · (1 + sd z), and a zero of sd z. others: the constants that
     change with it, and their change for each standard deviation, where an earlier diagnosis knew only a combination; all z are
     still independent in the prior. nominal: the nominal value, in the unit in which an effect adds to it [SI]."""
 
@@ -58,22 +58,22 @@ class Uncertain:
 
     @property
     def changes(self) -> dict[str, float]:
-        """How far one standard deviation moves each number: the logarithm of it, a share of SUMS, [rad] of ZERO."""
+        """How far one standard deviation moves each number: the logarithm of it, a share of ADDITIVE, [rad] of ZERO."""
         return {self.name: self.sd, **dict(self.others)}
 
     def is_changed_by(self, effect: Effect) -> bool:
         """Whether an effect changes the same constant."""
         if self.name == ZERO:
             return effect == zero_effect()
-        return effect.name == self.name or any(p.adds_to == SUM_OF.get(self.name, self.name) for p in effect.parameters)
+        return effect.name == self.name or any(p.adds_to == PART_OF.get(self.name, self.name) for p in effect.parameters)
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
 
 
-def scaled(name: str, by: Array | float) -> Array | float:
+def factor_of(name: str, by: Array | float) -> Array | float:
     """A recalibrated constant over its nominal value. by: its changes added up, of `Uncertain.changes`."""
-    return np.maximum(1.0 + np.asarray(by), 0.0) if name in SUMS else np.exp(by)
+    return np.maximum(1.0 + np.asarray(by), 0.0) if name in ADDITIVE else np.exp(by)
 
 
 def term_of(c: Candidate) -> Term:
@@ -169,11 +169,11 @@ class Hypothesis:
             return np.asarray(n.sd * np.asarray(z))
         by_others = sum(x * other.changes.get(n.name, 0.0) for j, (other, x) in enumerate(zip(self.numbers, self.z))
                         if j != k and other.joint == n.joint)
-        return np.asarray(n.nominal * scaled(n.name, by_others + n.sd * np.asarray(z)))
+        return np.asarray(n.nominal * factor_of(n.name, by_others + n.sd * np.asarray(z)))
 
     def adds(self, i: int, to: int) -> float:
-        """What a unit of the effect's size that is number i of theta adds to the constant of number `to` [SI]; NaN where it
-        changes it otherwise."""
+        """The amount that a unit of the effect's size, number i of theta, adds to the constant of number `to` [SI]; NaN where the
+        effect changes it otherwise."""
         c = next(c for c, s in zip(self.effects, self.slices()) if s.start == i)
         adds = c.parameters[0].adds_to or self.numbers[to].name == ZERO
         return (c.typical[0] - c.neutral[0]) * c.parameters[0].si if adds else math.nan
@@ -227,10 +227,10 @@ def split_sums(h: Hypothesis, J: Array, options: EvidenceOptions) -> tuple[Hypot
     is largest, which changes no residual; and J (n, k), the residuals' slopes by theta, there.
 
     Along this line the likelihood is constant, and a fit stops anywhere on it. But evidence compares the best of each model, and
-    a constant recalibrated to its limit would leave the effect too little to be told from nothing."""
+    beside a constant recalibrated to its limit an effect would be so small that it seems to be absent."""
     for k, i in h.alike():
         unit, here = h.adds(i, k), h.theta[k]
-        total, factor = h.constant(k, here) + unit * h.theta[i], h.numbers[k].name not in (ZERO, *SUMS)
+        total, factor = h.constant(k, here) + unit * h.theta[i], h.numbers[k].name not in (ZERO, *ADDITIVE)
         if not np.isfinite(total) or (h.numbers[k].name != ZERO and total <= 0):
             continue  # the effect takes away all that there is: more of it changes nothing
         each = np.linspace(-FAR, FAR, NUMERICS.splits)
@@ -241,7 +241,8 @@ def split_sums(h: Hypothesis, J: Array, options: EvidenceOptions) -> tuple[Hypot
         cost = np.square(Prior.of(h, options).rows(theta)[:, [k, i]]).sum(axis=1)
         best = theta[np.argmin(np.where(possible, cost, np.inf))]
         if factor:
-            J = J * np.where(np.arange(len(best)) == k, h.constant(k, best[k]) / h.constant(k, here), 1.0)
+            J = J.copy()
+            J[:, k] *= h.constant(k, best[k]) / h.constant(k, here)
         h = h.at(best)
     return h, J
 

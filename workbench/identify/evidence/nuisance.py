@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from workbench.identify.evidence.hypothesis import SUMS, ZERO, Uncertain, scaled, zero_effect
+from workbench.identify.evidence.hypothesis import ADDITIVE, ZERO, Uncertain, factor_of, zero_effect
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.physical import SERVO
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
@@ -67,7 +67,7 @@ def recalibrate(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
         if name == ZERO:
             zeros += [turned_horn(joint, by)] if by else []
         elif by:
-            scales.setdefault(joint, {})[name] = float(scaled(name, by))
+            scales.setdefault(joint, {})[name] = float(factor_of(name, by))
     servos |= {joint: _scaled(servos[joint], tuple(by.items())) for joint, by in scales.items()}
     return model.with_physics(servos, (*model.effects, *zeros))
 
@@ -145,7 +145,7 @@ def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Arra
     servos = {j: model.servo(j) for j in model.joints}
     M = mixing(numbers)
     for k, n in enumerate(numbers):  # shares of what a sum is now
-        if n.name in SUMS and (now := nominal_value(servos[n.joint], n.name)) > 0:
+        if n.name in ADDITIVE and (now := nominal_value(servos[n.joint], n.name)) > 0:
             M[k] *= n.nominal / now
     C = M @ covariance @ M.T
     for joint in dict.fromkeys(n.joint for n in numbers):

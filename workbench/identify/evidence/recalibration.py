@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.identify.evidence.hypothesis import FAR, ZERO, Hypothesis, scaled
+from workbench.identify.evidence.hypothesis import FAR, ZERO, Hypothesis, factor_of
 from workbench.identify.evidence.nuisance import UNITS, as_mapping, changed_by, mixing, nominal_value
 from workbench.identify.results.servo_law import Recalibrated
 from workbench.robot import RobotModel
@@ -47,7 +47,7 @@ def list_changes(model: RobotModel, h: Hypothesis) -> tuple[Recalibrated, ...]:
         if (joint, name) in found:
             continue
         nominal = 0.0 if name == ZERO else nominal_value(model.servo(joint), name)
-        value = by if name == ZERO else nominal * float(scaled(name, by))
+        value = by if name == ZERO else nominal * float(factor_of(name, by))
         out.append(Recalibrated(name, (joint,), nominal, value, sds[joint, name] * (nominal or 1.0), UNITS[name],
                                 (joint, name) in ended))
     return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

@@ -148,8 +148,8 @@ def _is_same_model(a: Hypothesis, b: Hypothesis) -> bool:
 def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: TieFits | None,
                         weighed: bool = False) -> GravityOverTorque | None:
     """The tie as it is reported; None where nothing of it has changed, or where an effect that could look like one of its effects
-    (`Effect.resembles`) is told from all of them. region: of the posterior, whose last fit may be to more of the takes than
-    `fits`, which are of `fits_of_tie`; weighed: as the result has it."""
+    (`Effect.resembles`) is distinguished from all of them. region: of the posterior, whose last fit may be to more of the
+    takes than `fits`, which are of `fits_of_tie`; weighed: as the result has it."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or fits is None or not fits.names:
         return None

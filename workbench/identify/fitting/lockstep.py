@@ -22,7 +22,7 @@ def through(part: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any],
 
 def side_by_side(parts: Sequence[Generator[list[Any], list[Any], Any]], report: Callable[[float], None] = lambda share: None
                  ) -> Generator[list[Any], list[Any], list[Any]]:
-    """Several generators as one, whose requests are those of all. Returns the result of each."""
+    """Several generators as one, which yields the requests of every one together. Returns the result of each."""
     done: dict[int, Any] = {}
     wants: dict[int, list[Any]] = {}
 
@@ -45,7 +45,7 @@ def side_by_side(parts: Sequence[Generator[list[Any], list[Any], Any]], report: 
 
 def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],
              report: Callable[[float], None] = lambda share: None) -> dict[T, Any]:
-    """Runs generators in lockstep: the requests of all, each with its generator's key, are answered in one call. Returns the
+    """Runs generators in lockstep: all their requests, each with its generator's key, are answered in one call. Returns the
     result of each."""
     def with_key(key: T, part: Generator[list[Any], list[Any], Any]) -> Generator[list[Any], list[Any], Any]:
         return through(part, lambda want: (key, want), lambda given: given)

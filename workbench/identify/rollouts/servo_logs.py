@@ -91,5 +91,5 @@ _ordered: Cache[Commands] = Cache(PROBLEM.states_kept)
 
 
 def _in_order(commands: Commands, joints: tuple[str, ...]) -> Commands:
-    """`Commands.reordered`, the same object for the same commands: what is derived from them is kept by that."""
+    """`Commands.reordered`, the same object for the same commands: results derived from them are cached by object."""
     return _ordered.get((id(commands), joints), lambda: commands.reordered(joints), commands)

@@ -137,8 +137,8 @@ def _lengthened(rows: Array, count: int, by: float) -> Array:
 
 
 def schedules_in_lanes(schedules: Sequence[Schedule]) -> tuple[Schedule, Ints, Ints]:
-    """Of up to LANES robots, schedules that differ in their commands alone: with the commands of all one after the other; the
-    first of each lane (LANES,), and behind its last. Lanes that are left over do as the last robot does."""
+    """Schedules of up to LANES robots, which differ in their commands alone, as one schedule with the commands of every robot in
+    turn; and each lane's first command (LANES,) and the end of its commands. Unused lanes do as the last robot does."""
     own = list({id(s): s for s in schedules}.values())
     ends = np.cumsum([len(s.command_step) for s in own])
     which = [next(k for k, s in enumerate(own) if s is mine) for mine in schedules]

@@ -38,7 +38,7 @@ def command(schedule: Schedule, k: int, at: Ints, end: Ints, bank: LaneServos, s
 
 @part
 def _hear(schedule: Schedule, c: int, bank: LaneServos, states: State, l: int) -> None:
-    """Lane l takes the goals and speeds of command number c; what it has ramped since then is taken back."""
+    """Lane l takes the goals and speeds of command number c, and undoes its ramp since then."""
     late = schedule.late[c]
     share = late / schedule.dt
     for i in range(states.goal.shape[0]):

@@ -45,7 +45,7 @@ def joint_angles(plays: Sequence[Play], in_lanes: bool = True) -> list[Array | N
     """Angles (rows, n) [rad] of all joints at the rows of each run's log, or why it has to be Drake's.
 
     In lanes go held robots without torque tables, those of one structure that are put to the same states together: they may
-    differ in masses, springs, play, limits, friction, gravity, in all that servos do, and in what they are told when. A lane in
+    differ in masses, springs, play, limits, friction, gravity, in everything that servos do, and in their commands. A lane in
     which links touch is played again alone. Who plays along changes no bit of a robot's angles, so that even one is played in
     lanes. in_lanes: False plays each alone, by the kernel of one robot; angles are the same to rounding. On a processor without
     vectors they are, too, but nothing is gained.
